@@ -1,0 +1,2 @@
+//! dualframe
+fn main() {}
