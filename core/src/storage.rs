@@ -195,6 +195,7 @@ impl<T> Static<T> {
     }
 
     /// The value, at the first call.
+    #[expect(clippy::mut_from_ref, reason = "the flag lends it once")]
     pub fn take(&'static self) -> Option<&'static mut T> {
         if self.taken.exchange(0, 1, site::STATIC_TAKE).is_err() {
             return None;
