@@ -10,24 +10,33 @@ use crate::sync::{Atomic, const_fn, site};
 #[derive(Debug)]
 pub struct Token<'p, R> {
     pub(crate) renderer: R,
-    office: &'p TokenOffice,
+    permit: Permit<'p>,
 }
+
+/// One of the tokens that an office may have out.
+#[derive(Debug)]
+struct Permit<'p>(&'p TokenOffice);
 
 impl<'p, R> Token<'p, R> {
     /// Whether this token was issued by `office`: it renders no other pipeline's frames.
     pub(crate) fn is_from(&self, office: &TokenOffice) -> bool {
-        ::core::ptr::eq(self.office, office)
+        ::core::ptr::eq(self.permit.0, office)
     }
 
     /// The graphics context.
     pub fn renderer(&mut self) -> &mut R {
         &mut self.renderer
     }
+
+    /// Gives the token up and the graphics context back.
+    pub fn into_renderer(self) -> R {
+        self.renderer
+    }
 }
 
-impl<R> Drop for Token<'_, R> {
+impl Drop for Permit<'_> {
     fn drop(&mut self) {
-        self.office.left.fetch_add(1, site::TOKEN_COUNT);
+        self.0.left.fetch_add(1, site::TOKEN_COUNT);
     }
 }
 
@@ -49,7 +58,7 @@ impl TokenOffice {
         let mut left = self.left.load(site::EXCLUSIVE);
         while left > 0 {
             match self.left.exchange(left, left - 1, site::TOKEN_COUNT) {
-                Ok(_) => return Ok(Token { renderer, office: self }),
+                Ok(_) => return Ok(Token { renderer, permit: Permit(self) }),
                 Err(found) => left = found,
             }
         }
