@@ -1,0 +1,91 @@
+//! The behaviour manager of an object (Fig. 2): how it changes from frame to frame.
+
+mod fixed;
+mod mass_spring;
+mod scripted;
+
+use std::any::Any;
+use std::hash::Hasher;
+
+use glam::Vec3;
+
+use crate::geometry::{Geometry, LANES, Lanes};
+use crate::interaction::Contact;
+use crate::message::Message;
+use crate::object::ObjectId;
+
+pub use fixed::Fixed;
+pub use mass_spring::{MassSpring, MassSpringError};
+pub use scripted::{Keyframe, ScriptError, Scripted};
+
+/// How an object changes from frame to frame.
+pub trait Behavior: Any + Send + Sync {
+    /// Advances the geometry by one frame.
+    fn update(&mut self, geometry: &mut Geometry, input: &mut Input<'_>);
+
+    /// Processes one of the engine's messages that concerns the behaviour; by default it is ignored.
+    fn process(&mut self, _message: &Message) {}
+
+    /// Whether the object is scenery: it is never updated, and told of no contacts.
+    fn is_fixed(&self) -> bool {
+        false
+    }
+
+    /// Adds what this behaviour remembers from frame to frame to the state hash.
+    fn hash_state(&self, _hasher: &mut dyn Hasher) {}
+}
+
+/// What an update is given.
+pub struct Input<'a> {
+    /// The frame being computed.
+    pub frame: u64,
+    /// The time from one frame to the next, in seconds.
+    pub time_step: f32,
+    /// The acceleration of gravity, in metres per second squared.
+    pub gravity: Vec3,
+    pub(crate) object: ObjectId,
+    pub(crate) segments: &'a [Segment],
+    pub(crate) records: &'a [Contact],
+    pub(crate) workspace: &'a mut Workspace,
+    pub(crate) post: &'a mut dyn FnMut(ObjectId, ObjectId, Message),
+}
+
+impl Input<'_> {
+    /// What this frame's interactions did to the object, ordered by the other object's number.
+    pub fn contacts(&self) -> impl Iterator<Item = &Contact> + '_ {
+        self.segments.iter().flat_map(|segment| &self.records[segment.start..segment.end])
+    }
+
+    /// Sends a message to another object, which processes it before its update of the next frame. A
+    /// message to an object that does not exist, or that is quarantined by then, is lost.
+    pub fn post(&mut self, to: ObjectId, message: Message) {
+        (self.post)(self.object, to, message);
+    }
+}
+
+/// Where an object's contacts with one other lie among the records gathered for a block.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Segment {
+    pub(crate) object: ObjectId,
+    pub(crate) other: ObjectId,
+    pub(crate) start: usize,
+    pub(crate) end: usize,
+}
+
+/// Memory that the updates of a block's objects use one after the other.
+#[derive(Debug, Default)]
+pub(crate) struct Workspace {
+    forces: [Vec<Lanes>; 3],
+}
+
+impl Workspace {
+    /// Room for the forces on so many chunks of nodes, in newtons, of any content.
+    pub(crate) fn forces(&mut self, chunks: usize) -> [&mut [Lanes]; 3] {
+        self.forces.each_mut().map(|component| {
+            if component.len() < chunks {
+                component.resize(chunks, [0.0; LANES]);
+            }
+            &mut component[..chunks]
+        })
+    }
+}

@@ -1,0 +1,129 @@
+//! Blocks of spatially close objects: the units that executors schedule.
+
+use crate::behavior::{Segment, Workspace};
+use crate::geometry::{Bounds, LANES, Lanes};
+use crate::interaction::{Contact, group_set};
+use crate::object::Object;
+
+/// One or more objects that go through the stages together, in ascending order of their numbers.
+#[derive(Default)]
+pub struct Block {
+    pub(crate) objects: Vec<Object>,
+    pub(crate) boxes: Boxes,
+    pub(crate) gathered: Gathered,
+    bounds: Option<Bounds>,
+    groups: u32,
+}
+
+impl Block {
+    /// The objects.
+    #[must_use]
+    pub fn objects(&self) -> &[Object] {
+        &self.objects
+    }
+
+    /// The box around all its objects that may interact.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        self.bounds.unwrap_or(Bounds::EMPTY)
+    }
+
+    /// The groups of its objects that may interact, a bit each.
+    pub(crate) fn groups(&self) -> u32 {
+        self.groups
+    }
+
+    /// Brings boxes and groups up to date with the objects.
+    pub(crate) fn refresh(&mut self) {
+        self.boxes.clear();
+        self.groups = 0;
+        let mut bounds = Bounds::EMPTY;
+        for object in &self.objects {
+            let own = object.interaction_bounds();
+            self.boxes.push(&own);
+            bounds = bounds.union(&own);
+            if own != Bounds::EMPTY {
+                self.groups |= group_set(object.group());
+            }
+        }
+        self.bounds = Some(bounds);
+    }
+
+    /// The place of an object among [`Block::objects`].
+    pub(crate) fn find(&self, id: crate::object::ObjectId) -> Option<usize> {
+        self.objects.binary_search_by_key(&id, Object::id).ok()
+    }
+}
+
+/// Contacts of this frame's updates, collected from wherever interactions left them.
+#[derive(Default)]
+pub(crate) struct Gathered {
+    pub(crate) records: Vec<Contact>,
+    pub(crate) segments: Vec<Segment>,
+    pub(crate) workspace: Workspace,
+}
+
+impl Gathered {
+    pub(crate) fn clear(&mut self) {
+        self.records.clear();
+        self.segments.clear();
+    }
+
+    pub(crate) fn push(&mut self, segment: &[Contact]) {
+        let Some(Contact { object, other, .. }) = segment.first().copied() else { return };
+        let start = self.records.len();
+        self.records.extend_from_slice(segment);
+        self.segments.push(Segment { object, other, start, end: self.records.len() });
+    }
+}
+
+/// Bounding boxes in whole lanes, padded with empty ones.
+#[derive(Default)]
+pub(crate) struct Boxes {
+    min: [Vec<Lanes>; 3],
+    max: [Vec<Lanes>; 3],
+    len: usize,
+}
+
+impl Boxes {
+    fn clear(&mut self) {
+        for component in self.min.iter_mut().chain(&mut self.max) {
+            component.clear();
+        }
+        self.len = 0;
+    }
+
+    fn push(&mut self, bounds: &Bounds) {
+        let (chunk, lane) = (self.len / LANES, self.len % LANES);
+        for axis in 0..3 {
+            if lane == 0 {
+                self.min[axis].push([f32::INFINITY; LANES]);
+                self.max[axis].push([f32::NEG_INFINITY; LANES]);
+            }
+            self.min[axis][chunk][lane] = bounds.min[axis];
+            self.max[axis][chunk][lane] = bounds.max[axis];
+        }
+        self.len += 1;
+    }
+
+    /// The places, from `first` on, of the boxes that overlap `bounds`, in ascending order.
+    pub(crate) fn overlapping(
+        &self,
+        bounds: &Bounds,
+        first: usize,
+    ) -> impl Iterator<Item = usize> + use<'_> {
+        let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
+        (first / LANES..self.min[0].len()).flat_map(move |chunk| {
+            let mut hits = [true; LANES];
+            for axis in 0..3 {
+                let (low, high) = (&self.min[axis][chunk], &self.max[axis][chunk]);
+                for lane in 0..LANES {
+                    hits[lane] &= (low[lane] <= max[axis]) & (high[lane] >= min[axis]);
+                }
+            }
+            let lanes = if hits == [false; LANES] { 0 } else { LANES };
+            let places = (0..lanes).filter(move |&lane| hits[lane]);
+            places.map(move |lane| chunk * LANES + lane).filter(move |&place| place >= first)
+        })
+    }
+}

@@ -1,0 +1,224 @@
+//! How objects are grouped into blocks: by recursive median splits of their positions.
+
+use thiserror::Error;
+
+use crate::block::Block;
+use crate::object::Object;
+
+/// How objects are grouped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Grain {
+    /// Blocks of spatially close objects: right for many light objects.
+    #[default]
+    Spatial,
+    /// One object a block, every modelled pair tested by itself, as in the paper: right for few, heavy
+    /// or uneven objects.
+    Pairwise,
+}
+
+/// Why objects cannot be grouped.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum BlockingError {
+    /// Object numbers must be 0, 1, 2 … without gaps, in any order.
+    #[error("object number {id} is given twice or is not below the number of objects, {objects}")]
+    Number {
+        /// The number.
+        id: u32,
+        /// The number of objects.
+        objects: usize,
+    },
+    /// Too many objects.
+    #[error("{objects} objects are more than the {limit} that this broad phase allows")]
+    TooManyObjects {
+        /// The number of objects.
+        objects: usize,
+        /// The greatest number allowed.
+        limit: usize,
+    },
+}
+
+/// The frames between two regroupings: in so many a particle moves by a fraction of a block.
+pub const FRAMES_PER_BLOCKING: u64 = 16;
+
+/// Objects a block where there are few objects.
+const OBJECTS_PER_BLOCK: usize = 16;
+/// Objects a block where there are so many that [`BLOCKS`] would not do.
+const OBJECTS_PER_LARGE_BLOCK: usize = 40;
+/// The number of blocks up to which they hold [`OBJECTS_PER_BLOCK`] objects.
+const BLOCKS: usize = 64;
+/// The fewest blocks for each worker.
+const BLOCKS_PER_WORKER: usize = 4;
+
+/// Groups objects into a number of blocks that stays the same; which objects are together changes.
+///
+/// Scenery and solitary objects have blocks of their own: the boxes of walls would make any block
+/// overlap every other. To regroup, every block is drained, the positions are split, and every block
+/// is filled again.
+pub struct Blocking {
+    objects: Vec<Option<Object>>,
+    members: Vec<Vec<u32>>,
+    keys: Vec<Key>,
+    moving_blocks: usize,
+}
+
+/// Where an object is.
+#[derive(Clone, Copy)]
+struct Key {
+    center: [f32; 3],
+    id: u32,
+}
+
+impl Blocking {
+    /// The most objects of an environment.
+    pub const MAX_OBJECTS: usize = 100_000;
+    /// The most objects with [`Grain::Pairwise`], whose memory grows with the square of their number.
+    pub const MAX_PAIRWISE_OBJECTS: usize = 4_096;
+
+    /// Groups the objects for so many workers.
+    ///
+    /// # Errors
+    /// Object numbers that are not 0, 1, 2 …, or more objects than the grain allows.
+    pub fn new(
+        objects: Vec<Object>,
+        grain: Grain,
+        workers: usize,
+    ) -> Result<(Self, Vec<Block>), BlockingError> {
+        let limit = match grain {
+            Grain::Spatial => Self::MAX_OBJECTS,
+            Grain::Pairwise => Self::MAX_PAIRWISE_OBJECTS,
+        };
+        let count = objects.len();
+        if count > limit {
+            return Err(BlockingError::TooManyObjects { objects: count, limit });
+        }
+        let mut slots: Vec<Option<Object>> = Vec::new();
+        slots.resize_with(count, || None);
+        for object in objects {
+            let id = object.id().0;
+            match slots.get_mut(id as usize) {
+                Some(slot @ None) => *slot = Some(object),
+                _ => return Err(BlockingError::Number { id, objects: count }),
+            }
+        }
+        Ok(Self::group(slots, grain, workers))
+    }
+
+    fn group(objects: Vec<Option<Object>>, grain: Grain, workers: usize) -> (Self, Vec<Block>) {
+        let mut kinds: [Vec<u32>; 3] = Default::default();
+        for object in objects.iter().flatten() {
+            kinds[kind(object)].push(object.id().0);
+        }
+        let [moving, scenery, solitary] = kinds;
+        let (moving_blocks, scenery_blocks, solitary_blocks) = match grain {
+            Grain::Pairwise => (moving.len(), scenery.len(), solitary.len()),
+            Grain::Spatial => (
+                block_count(moving.len(), workers),
+                scenery.len().min(1),
+                block_count(solitary.len(), workers),
+            ),
+        };
+        let mut members = vec![Vec::new(); moving_blocks];
+        for (ids, blocks) in [(scenery, scenery_blocks), (solitary, solitary_blocks)] {
+            let size = ids.len().div_ceil(blocks.max(1)).max(1);
+            members.extend(ids.chunks(size).map(<[u32]>::to_vec));
+        }
+        let mut blocks = Vec::new();
+        blocks.resize_with(members.len(), Block::default);
+        let keys = Vec::with_capacity(moving.len());
+        let mut blocking = Self { objects, members, keys, moving_blocks };
+        blocking.split();
+        for (index, block) in blocks.iter_mut().enumerate() {
+            blocking.fill(index, block);
+        }
+        (blocking, blocks)
+    }
+
+    /// Takes all objects out of a block.
+    pub fn drain(&mut self, block: &mut Block) {
+        for object in block.objects.drain(..) {
+            if let Some(slot) = self.objects.get_mut(object.id().0 as usize) {
+                *slot = Some(object);
+            }
+        }
+    }
+
+    /// Decides, when all blocks are drained, which objects go where.
+    pub fn split(&mut self) {
+        self.keys.clear();
+        let moving = self.objects.iter().flatten().filter(|object| kind(object) == MOVING);
+        self.keys.extend(moving.map(Key::new));
+        split(&mut self.keys, &mut self.members[..self.moving_blocks]);
+    }
+
+    /// Puts the objects of the block number `index` into it.
+    pub fn fill(&mut self, index: usize, block: &mut Block) {
+        let Some(members) = self.members.get(index) else { return };
+        block.objects.reserve(members.len());
+        for &id in members {
+            block.objects.extend(self.objects.get_mut(id as usize).and_then(Option::take));
+        }
+        block.refresh();
+    }
+}
+
+const MOVING: usize = 0;
+
+fn kind(object: &Object) -> usize {
+    match (object.is_solitary(), object.is_fixed()) {
+        (false, false) => MOVING,
+        (false, true) => 1,
+        (true, _) => 2,
+    }
+}
+
+/// The number of blocks for so many objects.
+fn block_count(objects: usize, workers: usize) -> usize {
+    let few = objects.div_ceil(OBJECTS_PER_BLOCK).min(BLOCKS);
+    let wanted = few.max(BLOCKS_PER_WORKER * workers).max(objects / OBJECTS_PER_LARGE_BLOCK);
+    wanted.min(objects)
+}
+
+impl Key {
+    fn new(object: &Object) -> Self {
+        let bounds = object.bounds();
+        let center = if bounds.is_finite() { bounds.center().to_array() } else { [0.0; 3] };
+        Self { center, id: object.id().0 }
+    }
+}
+
+/// Shares the objects out evenly: halves along the longest side until each part is one block.
+fn split(keys: &mut [Key], members: &mut [Vec<u32>]) {
+    match members {
+        [] => {}
+        [only] => {
+            only.clear();
+            only.extend(keys.iter().map(|key| key.id));
+            only.sort_unstable();
+        }
+        _ => {
+            let half = members.len() / 2;
+            let middle = keys.len() * half / members.len();
+            if middle < keys.len() {
+                let axis = longest_side(keys);
+                keys.select_nth_unstable_by(middle, |a, b| {
+                    a.center[axis].total_cmp(&b.center[axis]).then(a.id.cmp(&b.id))
+                });
+            }
+            let (low, high) = keys.split_at_mut(middle);
+            let (low_members, high_members) = members.split_at_mut(half);
+            split(low, low_members);
+            split(high, high_members);
+        }
+    }
+}
+
+fn longest_side(keys: &[Key]) -> usize {
+    let side = |axis: usize| {
+        let values = keys.iter().map(|key| key.center[axis]);
+        let (low, high) = values
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), value| (l.min(value), h.max(value)));
+        high - low
+    };
+    let sides = [side(0), side(1), side(2)];
+    (1..3).fold(0, |longest, axis| if sides[axis] > sides[longest] { axis } else { longest })
+}

@@ -1,0 +1,165 @@
+//! A deformable surface: nodes with positions, velocities and masses.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use thiserror::Error;
+
+use super::bounds::Bounds;
+use super::topology::Topology;
+use super::vectors::{LANES, Lanes, Vectors};
+
+/// Why a mesh cannot be built.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum MeshError {
+    /// The number of positions or masses is not the topology's number of nodes.
+    #[error("{given} {what} were given for {nodes} nodes")]
+    Length {
+        /// What there were too many or too few of.
+        what: &'static str,
+        /// How many were given.
+        given: usize,
+        /// The number of nodes.
+        nodes: usize,
+    },
+    /// A mass is negative or not finite.
+    #[error("the mass of node {node} is {mass} kg; it must be finite and not negative")]
+    Mass {
+        /// The node.
+        node: usize,
+        /// Its mass, in kilograms.
+        mass: f32,
+    },
+}
+
+/// A deformable surface.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    topology: Arc<Topology>,
+    /// The nodes' positions, in metres.
+    pub positions: Vectors,
+    /// The nodes' velocities, in metres per second.
+    pub velocities: Vectors,
+    masses: Vec<Lanes>,
+    inverse_masses: Vec<Lanes>,
+    contact_radius: f32,
+}
+
+impl Mesh {
+    /// A surface at rest.
+    ///
+    /// `positions` are in metres, `masses` in kilograms, one each per node; a node of mass 0 is held
+    /// fast: no force moves it. `contact_radius`, in metres, is that of the contact sphere which each
+    /// node carries.
+    ///
+    /// # Errors
+    /// Lists of another length than the topology's number of nodes; a mass that is negative or not
+    /// finite.
+    pub fn new(
+        topology: Arc<Topology>,
+        positions: &[Vec3],
+        masses: &[f32],
+        contact_radius: f32,
+    ) -> Result<Self, MeshError> {
+        let nodes = topology.nodes();
+        for (what, given) in [("positions", positions.len()), ("masses", masses.len())] {
+            if given != nodes {
+                return Err(MeshError::Length { what, given, nodes });
+            }
+        }
+        let wrong = |&(_, &mass): &(usize, &f32)| !(mass >= 0.0 && mass.is_finite());
+        if let Some((node, &mass)) = masses.iter().enumerate().find(wrong) {
+            return Err(MeshError::Mass { node, mass });
+        }
+        let inverse = |&mass: &f32| if mass > 0.0 { 1.0 / mass } else { 0.0 };
+        Ok(Self {
+            positions: Vectors::from_slice(positions),
+            velocities: Vectors::zeros(nodes),
+            inverse_masses: in_lanes(masses.iter().map(inverse), nodes),
+            masses: in_lanes(masses.iter().copied(), nodes),
+            topology,
+            contact_radius,
+        })
+    }
+
+    /// What the nodes are joined by.
+    #[must_use]
+    pub fn topology(&self) -> &Arc<Topology> {
+        &self.topology
+    }
+
+    /// The nodes' masses, in kilograms; 0 for a node that is held fast.
+    #[must_use]
+    pub fn masses(&self) -> &[f32] {
+        &self.masses.as_flattened()[..self.topology.nodes()]
+    }
+
+    /// The radius of each node's contact sphere, in metres.
+    #[must_use]
+    pub fn contact_radius(&self) -> f32 {
+        self.contact_radius
+    }
+
+    /// Gives every node the same velocity, in metres per second.
+    pub fn set_velocity(&mut self, velocity: Vec3) {
+        for node in 0..self.velocities.len() {
+            self.velocities.set(node, velocity);
+        }
+    }
+
+    /// Changes a node's velocity by an impulse, in newton seconds; a node past the last is ignored.
+    pub fn apply_impulse(&mut self, node: u32, impulse: Vec3) {
+        let node = node as usize;
+        if let Some(&inverse_mass) = self.inverse_masses.as_flattened().get(node) {
+            self.velocities.add(node, impulse * inverse_mass);
+        }
+    }
+
+    /// The box around the contact spheres of all nodes.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        let (min, max) = self.positions.extremes();
+        Bounds { min, max }.inflated(self.contact_radius)
+    }
+
+    /// Whether every position and velocity is a finite number.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.positions.is_finite() && self.velocities.is_finite()
+    }
+
+    /// Takes over the topology, positions and velocities of another mesh.
+    pub(crate) fn copy_state_from(&mut self, other: &Self) {
+        self.topology.clone_from(&other.topology);
+        self.positions.copy_from(&other.positions);
+        self.velocities.copy_from(&other.velocities);
+    }
+
+    /// The parts a kernel works on, all borrowed at once.
+    pub(crate) fn kernel_parts(&mut self) -> KernelParts<'_> {
+        KernelParts {
+            topology: &self.topology,
+            positions: &mut self.positions,
+            velocities: &mut self.velocities,
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+        }
+    }
+}
+
+/// A mesh, taken apart for a kernel.
+pub(crate) struct KernelParts<'a> {
+    pub(crate) topology: &'a Topology,
+    pub(crate) positions: &'a mut Vectors,
+    pub(crate) velocities: &'a mut Vectors,
+    pub(crate) masses: &'a [Lanes],
+    pub(crate) inverse_masses: &'a [Lanes],
+}
+
+fn in_lanes(values: impl Iterator<Item = f32>, len: usize) -> Vec<Lanes> {
+    let mut lanes = vec![[0.0; LANES]; len.div_ceil(LANES)];
+    for (lane, value) in lanes.as_flattened_mut().iter_mut().zip(values) {
+        *lane = value;
+    }
+    lanes
+}

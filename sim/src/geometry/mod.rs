@@ -1,0 +1,79 @@
+//! The geometry module of an object (Fig. 2): what it is shaped like and where it is.
+
+mod bounds;
+mod icosphere;
+mod mesh;
+mod rigid;
+mod topology;
+mod vectors;
+
+pub use bounds::Bounds;
+pub use icosphere::{ICOSPHERE_EDGES, ICOSPHERE_FACES, ICOSPHERE_NODES, icosphere};
+pub(crate) use mesh::KernelParts;
+pub use mesh::{Mesh, MeshError};
+pub use rigid::Rigid;
+pub use topology::{Spring, Topology, TopologyError, edges};
+pub use vectors::{LANES, Lanes, Vectors};
+
+/// An object's shape and place.
+#[derive(Clone)]
+pub enum Geometry {
+    /// A deformable surface.
+    Mesh(Mesh),
+    /// A rigid shape with a pose.
+    Rigid(Rigid),
+}
+
+impl Geometry {
+    /// The deformable surface, if it is one.
+    #[must_use]
+    pub fn as_mesh(&self) -> Option<&Mesh> {
+        match self {
+            Self::Mesh(mesh) => Some(mesh),
+            Self::Rigid(_) => None,
+        }
+    }
+
+    /// The deformable surface, to change it, if it is one.
+    pub fn as_mesh_mut(&mut self) -> Option<&mut Mesh> {
+        match self {
+            Self::Mesh(mesh) => Some(mesh),
+            Self::Rigid(_) => None,
+        }
+    }
+
+    /// The rigid shape, if it is one.
+    #[must_use]
+    pub fn as_rigid(&self) -> Option<&Rigid> {
+        match self {
+            Self::Rigid(rigid) => Some(rigid),
+            Self::Mesh(_) => None,
+        }
+    }
+
+    /// The rigid shape, to move it, if it is one.
+    pub fn as_rigid_mut(&mut self) -> Option<&mut Rigid> {
+        match self {
+            Self::Rigid(rigid) => Some(rigid),
+            Self::Mesh(_) => None,
+        }
+    }
+
+    /// The box around it, contact spheres included.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        match self {
+            Self::Mesh(mesh) => mesh.bounds(),
+            Self::Rigid(rigid) => rigid.bounds(),
+        }
+    }
+
+    /// Whether every number in it that changes is finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        match self {
+            Self::Mesh(mesh) => mesh.is_finite(),
+            Self::Rigid(rigid) => rigid.is_finite(),
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! Interactions (§4.1, Fig. 3): what objects do to each other.
+//!
+//! An interaction only reads its two objects. What it finds goes to a [`ContactSink`], and the
+//! objects' next updates add it up (§5.6).
+
+mod contact;
+mod impulses;
+mod nodes;
+mod penalty;
+mod rules;
+mod shape;
+mod touches;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use crate::object::Object;
+
+pub use contact::{Contact, ContactBuffer, ContactSink, TableFull};
+pub use impulses::Impulses;
+pub use nodes::NodeSpheres;
+pub use penalty::{Penalty, PenaltyError};
+pub(crate) use rules::group_set;
+pub use rules::{InteractionPair, RuleError, Rules};
+pub use shape::NodesInShape;
+pub use touches::{Touch, Touches};
+
+/// Finds where two objects touch.
+pub trait Detection: Send + Sync {
+    /// Adds the places where the objects touch. What it finds may depend on the two objects only.
+    fn detect(&self, first: &Object, second: &Object, touches: &mut Touches);
+}
+
+/// Says what touching does to two objects.
+pub trait Response: Send + Sync {
+    /// Adds the impulses of one frame of `time_step` seconds on the one and on the other object. It
+    /// is called only for objects that touch.
+    fn respond(
+        &self,
+        bodies: [&Object; 2],
+        touches: &Touches,
+        time_step: f32,
+        impulses: [&mut Impulses; 2],
+    );
+}
+
+/// Memory that the interactions of one worker use one after the other.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    touches: Touches,
+    impulses: [Impulses; 2],
+}
+
+impl Scratch {
+    /// Memory that grows as it is used.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Lets two objects interact and stores the results; says whether they touched.
+    pub(crate) fn interact(
+        &mut self,
+        pair: &InteractionPair,
+        bodies: [&Object; 2],
+        time_step: f32,
+        sink: &mut impl ContactSink,
+    ) -> Result<bool, TableFull> {
+        self.touches.clear();
+        for (impulses, body) in self.impulses.iter_mut().zip(bodies) {
+            impulses.reset(body.geometry.as_mesh().map_or(0, |mesh| mesh.positions.len()));
+        }
+        let [first, second] = bodies;
+        let done = catch_unwind(AssertUnwindSafe(|| {
+            pair.detection.detect(first, second, &mut self.touches);
+            if !self.touches.list().is_empty() {
+                let [on_first, on_second] = &mut self.impulses;
+                pair.response.respond(bodies, &self.touches, time_step, [on_first, on_second]);
+            }
+        }));
+        if done.is_err() {
+            for (object, other) in [(first, second), (second, first)] {
+                let (object, other) = (object.id(), other.id());
+                sink.push(&[Contact { object, other, node: Contact::FAULT, impulse: [0.0; 3] }])?;
+            }
+            return Ok(false);
+        }
+        let sides = self.impulses.iter_mut().zip([(first, second), (second, first)]);
+        for (impulses, (object, other)) in sides {
+            let segment = impulses.segment(object.id(), other.id());
+            // Nobody would read what scenery is told.
+            if !object.is_fixed() && !segment.is_empty() {
+                sink.push(segment)?;
+            }
+        }
+        Ok(!self.touches.list().is_empty())
+    }
+}

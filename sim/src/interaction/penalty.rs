@@ -1,0 +1,104 @@
+//! Response by penalty forces.
+
+use glam::Vec3;
+use thiserror::Error;
+
+use super::Response;
+use super::contact::Contact;
+use super::impulses::Impulses;
+use super::touches::{Touch, Touches};
+use crate::geometry::Geometry;
+use crate::object::Object;
+
+/// Why a response cannot be built.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[error("{what} is {value}; it must be finite and not negative")]
+pub struct PenaltyError {
+    /// The name of the value.
+    pub what: &'static str,
+    /// The value.
+    pub value: f32,
+}
+
+/// Pushes touching objects apart along the contact's normal, by a spring and a dashpot, and never
+/// pulls; where there is friction, it is Coulomb's, limited so that it stops a node at most.
+///
+/// Between nodes the force acts along the line of their centres on both alike, so without friction
+/// linear and angular momentum are kept up to rounding.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Penalty {
+    stiffness: f32,
+    damping: f32,
+    friction: f32,
+}
+
+impl Penalty {
+    /// A stiffness in newtons per metre of depth, a damping in newton seconds per metre, and a
+    /// coefficient of friction.
+    ///
+    /// # Errors
+    /// A value that is negative or not finite.
+    pub fn new(stiffness: f32, damping: f32, friction: f32) -> Result<Self, PenaltyError> {
+        let values =
+            [("the stiffness", stiffness), ("the damping", damping), ("the friction", friction)];
+        match values.into_iter().find(|&(_, value)| !(value >= 0.0 && value.is_finite())) {
+            Some((what, value)) => Err(PenaltyError { what, value }),
+            None => Ok(Self { stiffness, damping, friction }),
+        }
+    }
+
+    /// The impulse on the first object of a touch, in newton seconds.
+    fn impulse(&self, bodies: [&Object; 2], touch: &Touch, time_step: f32) -> Vec3 {
+        let normal = Vec3::from_array(touch.normal);
+        let mut force = self.stiffness * touch.depth;
+        if self.damping == 0.0 && self.friction == 0.0 {
+            return normal * (force * time_step);
+        }
+        let [first, second] = touch.nodes;
+        let relative = velocity(bodies[0], first) - velocity(bodies[1], second);
+        let apart = relative.dot(normal);
+        force = (force - self.damping * apart).max(0.0);
+        let push = normal * (force * time_step);
+        let slip = relative - normal * apart;
+        let speed = slip.length();
+        if self.friction == 0.0 || speed == 0.0 {
+            return push;
+        }
+        let stopping = mass(bodies[0], first).min(mass(bodies[1], second)) * speed;
+        let drag = (self.friction * force * time_step).min(stopping);
+        push - slip * (drag / speed)
+    }
+}
+
+impl Response for Penalty {
+    fn respond(
+        &self,
+        bodies: [&Object; 2],
+        touches: &Touches,
+        time_step: f32,
+        impulses: [&mut Impulses; 2],
+    ) {
+        let [first, second] = impulses;
+        for touch in touches.list() {
+            let impulse = self.impulse(bodies, touch, time_step);
+            first.add(touch.nodes[0], impulse.to_array());
+            second.add(touch.nodes[1], (-impulse).to_array());
+        }
+    }
+}
+
+fn velocity(object: &Object, node: u32) -> Vec3 {
+    match &object.geometry {
+        Geometry::Mesh(mesh) => mesh.velocities.get(node as usize).unwrap_or(Vec3::ZERO),
+        Geometry::Rigid(rigid) => rigid.velocity,
+    }
+}
+
+/// A node's mass, in kilograms; infinite for what no force of the environment moves.
+fn mass(object: &Object, node: u32) -> f32 {
+    let Some(mesh) = object.geometry.as_mesh() else { return f32::INFINITY };
+    match mesh.masses().get(node as usize) {
+        Some(&mass) if node != Contact::BODY && mass > 0.0 => mass,
+        _ => f32::INFINITY,
+    }
+}

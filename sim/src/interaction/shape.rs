@@ -1,0 +1,68 @@
+//! Detection between a deformable surface and a rigid shape.
+
+use glam::Vec3;
+
+use super::Detection;
+use super::contact::Contact;
+use super::touches::{Touch, Touches};
+use crate::geometry::{LANES, Mesh, Rigid};
+use crate::object::Object;
+
+/// Finds the nodes whose contact spheres reach into a rigid shape. The pair's first object is the
+/// deformable one. Walls are tested directly, other shapes by parry's exact point projection.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NodesInShape;
+
+impl Detection for NodesInShape {
+    fn detect(&self, first: &Object, second: &Object, touches: &mut Touches) {
+        let (Some(mesh), Some(rigid)) = (first.geometry.as_mesh(), second.geometry.as_rigid())
+        else {
+            return;
+        };
+        match rigid.plane() {
+            Some((point, normal)) => behind_plane(mesh, point, normal, touches),
+            None => in_shape(mesh, rigid, &second.bounds(), touches),
+        }
+    }
+}
+
+fn behind_plane(mesh: &Mesh, point: Vec3, normal: Vec3, touches: &mut Touches) {
+    let reach = mesh.contact_radius() + point.dot(normal);
+    let [nx, ny, nz] = normal.to_array();
+    let [x, y, z] = mesh.positions.components.each_ref();
+    for (chunk, ((x, y), z)) in x.iter().zip(y).zip(z).enumerate() {
+        let mut depths = [0.0; LANES];
+        for lane in 0..LANES {
+            depths[lane] = reach - (nx * x[lane] + ny * y[lane] + nz * z[lane]);
+        }
+        if depths.iter().all(|&depth| depth <= 0.0) {
+            continue;
+        }
+        for (lane, &depth) in depths.iter().enumerate() {
+            let node = chunk * LANES + lane;
+            if depth > 0.0 && node < mesh.positions.len() {
+                let nodes = [node as u32, Contact::BODY];
+                touches.push(Touch { nodes, normal: normal.to_array(), depth });
+            }
+        }
+    }
+}
+
+fn in_shape(mesh: &Mesh, rigid: &Rigid, bounds: &crate::geometry::Bounds, touches: &mut Touches) {
+    let radius = mesh.contact_radius();
+    let (list, [near, _]) = touches.parts();
+    near.select(mesh, &bounds.inflated(radius));
+    for (index, &node) in near.nodes().iter().enumerate() {
+        let position = Vec3::from_array(near.position(index));
+        let projection = rigid.shape.project_point(&rigid.pose, position, false);
+        let out = position - projection.point;
+        let distance = out.length();
+        let (depth, side) =
+            if projection.is_inside { (radius + distance, -1.0) } else { (radius - distance, 1.0) };
+        // A node exactly on the surface has no direction out; the next frame will tell.
+        if depth > 0.0 && distance > 0.0 {
+            let normal = (out * (side / distance)).to_array();
+            list.push(Touch { nodes: [node, Contact::BODY], normal, depth });
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! The message passing interface (§6.2).
+
+use std::fmt;
+
+use crate::object::{Object, ObjectId};
+
+/// Something told to an object. It is processed immediately before the object's next update; what is
+/// posted in frame f's updates is processed in frame f+1's, ordered by sender and then by the order
+/// of posting.
+#[derive(Debug)]
+pub enum Message {
+    /// Changes the velocity of one node. Nodes that do not exist are ignored.
+    Impulse {
+        /// The node.
+        node: u32,
+        /// The impulse, in newton seconds.
+        impulse: [f32; 3],
+    },
+    /// Sets the stiffness of all springs, in newtons per metre; negative or non-finite values are
+    /// ignored.
+    Stiffness(f32),
+    /// Switches the pull of gravity off (`true`) or on.
+    Weightless(bool),
+    /// Takes the object out of the environment for good.
+    Remove,
+    /// A message of the application's own making.
+    Custom(Box<dyn Custom>),
+}
+
+/// A message of the application's own making: the paper's base class with its *processMessage*
+/// callback.
+pub trait Custom: fmt::Debug + Send + Sync {
+    /// Changes the object as the message says.
+    fn process(&self, object: &mut Object);
+}
+
+/// A message on its way.
+#[derive(Debug)]
+pub struct Letter {
+    /// Whom it is for.
+    pub to: ObjectId,
+    /// Who sent it.
+    pub from: ObjectId,
+    /// What it says.
+    pub message: Message,
+}

@@ -1,0 +1,189 @@
+//! The 3D Object (§4.1, Fig. 2): a container into which visual properties, geometry, behaviour and a
+//! way of drawing are plugged.
+
+mod fault;
+mod visual;
+
+use std::fmt;
+
+use glam::Vec3;
+
+use crate::behavior::{Behavior, Fixed};
+use crate::geometry::{Bounds, Geometry};
+use crate::message::Message;
+
+pub use fault::{Fault, FaultKind};
+pub use visual::{Drawing, VisualProperties};
+
+/// An object's number. The objects of an environment are numbered from 0 without gaps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ObjectId(pub u32);
+
+impl ObjectId {
+    /// The sender of messages that come from outside the environment.
+    pub const HOST: Self = Self(u32::MAX);
+}
+
+impl fmt::Display for ObjectId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "object {}", self.0)
+    }
+}
+
+/// The kind of an object, by which the rule table says what interactions are modelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Group(pub u8);
+
+impl Group {
+    /// The number of groups there can be.
+    pub const COUNT: usize = 32;
+}
+
+/// An element of the virtual environment.
+pub struct Object {
+    id: ObjectId,
+    group: Group,
+    solitary: bool,
+    fixed: bool,
+    quarantined: Option<Fault>,
+    bounds: Bounds,
+    /// What it looks like.
+    pub visual: VisualProperties,
+    /// How it is drawn.
+    pub drawing: Drawing,
+    /// Its shape and place.
+    pub geometry: Geometry,
+    /// How it changes.
+    pub behavior: Box<dyn Behavior>,
+}
+
+impl Object {
+    /// An object that may interact and is drawn as a grey surface.
+    #[must_use]
+    pub fn new(
+        id: ObjectId,
+        group: Group,
+        geometry: Geometry,
+        behavior: impl Behavior + 'static,
+    ) -> Self {
+        Self {
+            id,
+            group,
+            solitary: false,
+            fixed: behavior.is_fixed(),
+            quarantined: None,
+            bounds: geometry.bounds(),
+            visual: VisualProperties::default(),
+            drawing: Drawing::default(),
+            geometry,
+            behavior: Box::new(behavior),
+        }
+    }
+
+    /// The same object without interactions: it goes straight to update and render (§5.1, §9).
+    #[must_use]
+    pub fn solitary(mut self) -> Self {
+        self.solitary = true;
+        self
+    }
+
+    /// Its number.
+    #[must_use]
+    pub fn id(&self) -> ObjectId {
+        self.id
+    }
+
+    /// Its kind.
+    #[must_use]
+    pub fn group(&self) -> Group {
+        self.group
+    }
+
+    /// Whether it takes part in no interaction.
+    #[must_use]
+    pub fn is_solitary(&self) -> bool {
+        self.solitary
+    }
+
+    /// Whether it is scenery, which nothing moves.
+    #[must_use]
+    pub fn is_fixed(&self) -> bool {
+        self.fixed
+    }
+
+    /// Why and when it was excluded, if it was.
+    #[must_use]
+    pub fn quarantined(&self) -> Option<Fault> {
+        self.quarantined
+    }
+
+    /// The box around it after its last update; empty for an excluded object.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    /// The box that interactions are to look at: empty for an object that has none.
+    pub(crate) fn interaction_bounds(&self) -> Bounds {
+        if self.solitary { Bounds::EMPTY } else { self.bounds }
+    }
+
+    /// Excludes it for good. The first fault counts.
+    pub(crate) fn quarantine(&mut self, fault: Fault) {
+        self.quarantined.get_or_insert(fault);
+        self.bounds = Bounds::EMPTY;
+    }
+
+    /// Brings the box up to date, or excludes the object if its state is not finite.
+    pub(crate) fn refresh(&mut self, frame: u64) {
+        if self.geometry.is_finite() {
+            self.bounds = self.geometry.bounds();
+        } else {
+            self.quarantine(Fault { kind: FaultKind::NonFinite, frame });
+        }
+    }
+
+    /// Processes one message of its inbox (§6.2).
+    pub(crate) fn process(&mut self, message: &Message, frame: u64) {
+        match message {
+            Message::Impulse { node, impulse } => {
+                if let Some(mesh) = self.geometry.as_mesh_mut() {
+                    mesh.apply_impulse(*node, Vec3::from_array(*impulse));
+                }
+            }
+            Message::Remove => self.quarantine(Fault { kind: FaultKind::Removed, frame }),
+            Message::Custom(custom) => custom.process(self),
+            Message::Stiffness(_) | Message::Weightless(_) => self.behavior.process(message),
+        }
+    }
+
+    /// A copy of what a renderer sees, without the behaviour.
+    #[must_use]
+    pub fn snapshot(&self) -> Self {
+        Self {
+            id: self.id,
+            group: self.group,
+            solitary: self.solitary,
+            fixed: true,
+            quarantined: self.quarantined,
+            bounds: self.bounds,
+            visual: self.visual,
+            drawing: self.drawing,
+            geometry: self.geometry.clone(),
+            behavior: Box::new(Fixed),
+        }
+    }
+
+    /// Brings an earlier snapshot of the same object up to date; allocates only if the geometry has
+    /// become another kind or size.
+    pub fn snapshot_into(&self, snapshot: &mut Self) {
+        snapshot.quarantined = self.quarantined;
+        snapshot.bounds = self.bounds;
+        snapshot.visual = self.visual;
+        snapshot.drawing = self.drawing;
+        match (&self.geometry, &mut snapshot.geometry) {
+            (Geometry::Mesh(from), Geometry::Mesh(to)) => to.copy_state_from(from),
+            (from, to) => to.clone_from(from),
+        }
+    }
+}

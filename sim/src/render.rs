@@ -1,0 +1,76 @@
+//! The render stage's device side.
+
+use crate::geometry::Geometry;
+use crate::object::Object;
+
+/// A graphics device. It belongs to whoever holds the render token, so it need not be shareable
+/// between threads.
+pub trait Renderer {
+    /// Draws one object of the current frame in the way its [`Drawing`] says. Objects come in no
+    /// particular order.
+    ///
+    /// [`Drawing`]: crate::object::Drawing
+    fn draw(&mut self, object: &Object);
+
+    /// Ends the frame: everything of `frame` is drawn.
+    fn swap(&mut self, frame: u64);
+}
+
+/// A renderer without a device: it reads what a real one would upload and keeps a checksum of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NullRenderer {
+    checksum: u64,
+    draws: u64,
+    swaps: u64,
+}
+
+impl NullRenderer {
+    /// A renderer that has drawn nothing.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// A checksum over everything drawn so far, the same for any order within a frame.
+    #[must_use]
+    pub fn checksum(&self) -> u64 {
+        self.checksum
+    }
+
+    /// The number of objects drawn so far.
+    #[must_use]
+    pub fn draws(&self) -> u64 {
+        self.draws
+    }
+
+    /// The number of frames swapped so far.
+    #[must_use]
+    pub fn swaps(&self) -> u64 {
+        self.swaps
+    }
+}
+
+/// An odd number without pattern in its bits (2⁶⁴ over the golden ratio), to spread sums.
+const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
+
+impl Renderer for NullRenderer {
+    fn draw(&mut self, object: &Object) {
+        let sum = match &object.geometry {
+            Geometry::Mesh(mesh) => mesh.positions.as_slices().map(bit_sum),
+            Geometry::Rigid(rigid) => rigid.pose.translation.to_array().map(f32::to_bits),
+        };
+        let [x, y, z] = sum.map(u64::from);
+        let mixed = x ^ y.rotate_left(21) ^ z.rotate_left(42) ^ u64::from(object.id().0);
+        self.checksum = self.checksum.wrapping_add(mixed.wrapping_mul(SPREAD));
+        self.draws += 1;
+    }
+
+    fn swap(&mut self, frame: u64) {
+        self.checksum = (self.checksum ^ frame).wrapping_mul(SPREAD);
+        self.swaps += 1;
+    }
+}
+
+fn bit_sum(values: &[f32]) -> u32 {
+    values.iter().fold(0, |sum, value| sum.wrapping_add(value.to_bits()))
+}

@@ -1,0 +1,230 @@
+//! The four stages of a frame, as every executor calls them.
+//!
+//! Results depend on the objects only: pairs are tested in an order of their own two objects, and an
+//! update adds up what it is given in the order of the other objects' numbers. So blocking, threads
+//! and order of calls never show in them.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::{Duration, Instant};
+
+use glam::Vec3;
+
+use crate::behavior::{Input, Segment, Workspace};
+use crate::block::{Block, Gathered};
+use crate::interaction::{Contact, ContactSink, Rules, Scratch, TableFull};
+use crate::message::Message;
+use crate::object::{Drawing, Fault, FaultKind, Object, ObjectId};
+use crate::render::Renderer;
+
+/// What the interaction stage counted. Independent of blocking and executor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PairCount {
+    /// Pairs of objects with a rule whose boxes overlap.
+    pub candidates: u64,
+    /// Those of them that touched.
+    pub collisions: u64,
+}
+
+impl std::ops::AddAssign for PairCount {
+    fn add_assign(&mut self, other: Self) {
+        self.candidates += other.candidates;
+        self.collisions += other.collisions;
+    }
+}
+
+/// What holds for a whole environment: the modelled interactions and the numbers all stages share.
+pub struct Stages {
+    /// The modelled interactions.
+    pub rules: Rules,
+    /// The time from one frame to the next, in seconds.
+    pub time_step: f32,
+    /// The acceleration of gravity, in metres per second squared.
+    pub gravity: Vec3,
+    /// How long one object's update may take before the object is quarantined, if there is a limit.
+    /// It is a limit on time as measured, so what it does is not repeatable.
+    pub callback_budget: Option<Duration>,
+}
+
+impl Stages {
+    /// Whether objects of two blocks may touch.
+    #[must_use]
+    pub fn broad_phase(&self, a: &Block, b: &Block) -> bool {
+        if !a.bounds().overlaps(&b.bounds()) || !self.rules.apply(a.groups(), b.groups()) {
+            return false;
+        }
+        // Around walls a block's box says little, but there are few of them.
+        let (few, many) = if a.objects.len() < b.objects.len() { (a, b) } else { (b, a) };
+        few.boxes.overlapping(&many.bounds(), 0).next().is_some()
+    }
+
+    /// Whether objects within one block may touch each other.
+    #[must_use]
+    pub fn interacts_within(&self, block: &Block) -> bool {
+        block.objects.len() > 1 && self.rules.apply(block.groups(), block.groups())
+    }
+
+    /// Lets the objects of one block interact with those of another.
+    ///
+    /// # Errors
+    /// The sink is full. The frame's results are then incomplete: enlarge the table and interact the
+    /// two blocks anew into an emptied sink.
+    pub fn interact(
+        &self,
+        a: &Block,
+        b: &Block,
+        scratch: &mut Scratch,
+        sink: &mut impl ContactSink,
+    ) -> Result<PairCount, TableFull> {
+        let (few, many) = if a.objects.len() < b.objects.len() { (a, b) } else { (b, a) };
+        let mut count = PairCount::default();
+        for place in few.boxes.overlapping(&many.bounds(), 0) {
+            let one = &few.objects[place];
+            for other in many.boxes.overlapping(&one.bounds(), 0) {
+                count += self.interact_pair(one, &many.objects[other], scratch, sink)?;
+            }
+        }
+        Ok(count)
+    }
+
+    /// Lets the objects within one block interact with each other.
+    ///
+    /// # Errors
+    /// As [`Stages::interact`].
+    pub fn interact_within(
+        &self,
+        block: &Block,
+        scratch: &mut Scratch,
+        sink: &mut impl ContactSink,
+    ) -> Result<PairCount, TableFull> {
+        let mut count = PairCount::default();
+        for (place, one) in block.objects.iter().enumerate() {
+            for other in block.boxes.overlapping(&one.interaction_bounds(), place + 1) {
+                count += self.interact_pair(one, &block.objects[other], scratch, sink)?;
+            }
+        }
+        Ok(count)
+    }
+
+    fn interact_pair(
+        &self,
+        a: &Object,
+        b: &Object,
+        scratch: &mut Scratch,
+        sink: &mut impl ContactSink,
+    ) -> Result<PairCount, TableFull> {
+        let Some((pair, bodies)) = self.rules.find(a, b) else { return Ok(PairCount::default()) };
+        let touched = scratch.interact(pair, bodies, self.time_step, sink)?;
+        Ok(PairCount { candidates: 1, collisions: u64::from(touched) })
+    }
+
+    /// Updates the objects of a block.
+    ///
+    /// `segments` are results of this frame's interactions in any order, among them all that concern
+    /// objects of this block; others are ignored. `mail` is (to, from, message) for objects of this
+    /// block, for each in the order in which it is to be processed: by sender, then by order of
+    /// posting; messages to other objects are ignored. `post` is given (from, to, message) for each
+    /// message that an object sends.
+    ///
+    /// An object whose callback panics, whose state is not finite afterwards, or that is over budget
+    /// is quarantined.
+    pub fn update<'m>(
+        &self,
+        frame: u64,
+        block: &mut Block,
+        segments: impl Iterator<Item = &'m [Contact]>,
+        mail: impl Iterator<Item = (ObjectId, ObjectId, &'m Message)> + Clone,
+        post: &mut dyn FnMut(ObjectId, ObjectId, Message),
+    ) {
+        gather(block, segments);
+        let Gathered { records, segments, workspace } = &mut block.gathered;
+        let mut rest = segments.as_slice();
+        for object in &mut block.objects {
+            let own = rest.partition_point(|segment| segment.object <= object.id());
+            let (segments, others) = rest.split_at(own);
+            rest = others;
+            if object.quarantined().is_some() {
+                continue;
+            }
+            let faulty = |record: &Contact| record.node == Contact::FAULT;
+            if segments.iter().any(|segment| faulty(&records[segment.start])) {
+                object.quarantine(Fault { kind: FaultKind::Panicked, frame });
+                continue;
+            }
+            let id = object.id();
+            let own_mail =
+                mail.clone().filter(move |&(to, ..)| to == id).map(|(.., message)| message);
+            let given = Given { frame, segments, records, workspace: &mut *workspace };
+            self.update_object(object, given, own_mail, post);
+        }
+        block.refresh();
+    }
+
+    fn update_object<'m>(
+        &self,
+        object: &mut Object,
+        given: Given<'_>,
+        mail: impl Iterator<Item = &'m Message>,
+        post: &mut dyn FnMut(ObjectId, ObjectId, Message),
+    ) {
+        let frame = given.frame;
+        let began = self.callback_budget.map(|budget| (Instant::now(), budget));
+        let mut input = Input {
+            frame,
+            time_step: self.time_step,
+            gravity: self.gravity,
+            object: object.id(),
+            segments: given.segments,
+            records: given.records,
+            workspace: given.workspace,
+            post,
+        };
+        let done = catch_unwind(AssertUnwindSafe(|| {
+            for message in mail {
+                object.process(message, frame);
+            }
+            if object.quarantined().is_none() && !object.is_fixed() {
+                object.behavior.update(&mut object.geometry, &mut input);
+            }
+        }));
+        if done.is_err() {
+            object.quarantine(Fault { kind: FaultKind::Panicked, frame });
+        } else if began.is_some_and(|(began, budget)| began.elapsed() > budget) {
+            object.quarantine(Fault { kind: FaultKind::OverBudget, frame });
+        } else if object.quarantined().is_none() {
+            object.refresh(frame);
+        }
+    }
+
+    /// Draws the objects of a block.
+    pub fn render(&self, block: &Block, renderer: &mut dyn Renderer) {
+        for object in &block.objects {
+            draw(object, renderer);
+        }
+    }
+}
+
+/// Draws an object, unless it is hidden or quarantined.
+pub(crate) fn draw(object: &Object, renderer: &mut dyn Renderer) {
+    if object.quarantined().is_none() && object.drawing != Drawing::Hidden {
+        renderer.draw(object);
+    }
+}
+
+/// What an object's update is given by its block.
+struct Given<'a> {
+    frame: u64,
+    segments: &'a [Segment],
+    records: &'a [Contact],
+    workspace: &'a mut Workspace,
+}
+
+/// Collects the segments that concern the block, by object and then by the other object's number.
+fn gather<'m>(block: &mut Block, segments: impl Iterator<Item = &'m [Contact]>) {
+    block.gathered.clear();
+    for segment in segments {
+        if segment.first().is_some_and(|record| block.find(record.object).is_some()) {
+            block.gathered.push(segment);
+        }
+    }
+    block.gathered.segments.sort_unstable_by_key(|segment| (segment.object, segment.other));
+}

@@ -1,0 +1,65 @@
+//! A hash over the state of an environment, to tell whether two runs agree bit for bit.
+
+use std::hash::Hasher;
+
+use fnv::FnvHasher;
+
+use crate::geometry::{Geometry, Vectors};
+use crate::object::{Object, ObjectId};
+
+/// The hash (FNV-1a, 64 bits) over the states of all objects, taken in the order of their numbers
+/// whatever order they come in.
+///
+/// An object's state is its positions and velocities bit by bit, what its behaviour remembers, and
+/// whether it is quarantined; of a quarantined object only that counts.
+#[must_use]
+pub fn state_hash<'a>(objects: impl IntoIterator<Item = &'a Object>) -> u64 {
+    let mut hashes: Vec<(ObjectId, u64)> =
+        objects.into_iter().map(|object| (object.id(), object_hash(object))).collect();
+    hashes.sort_unstable();
+    let mut hasher = FnvHasher::default();
+    for (id, hash) in hashes {
+        write(&mut hasher, id.0);
+        hasher.write(&hash.to_le_bytes());
+    }
+    hasher.finish()
+}
+
+/// The hash over the state of one object.
+#[must_use]
+pub fn object_hash(object: &Object) -> u64 {
+    let mut hasher = FnvHasher::default();
+    if let Some(fault) = object.quarantined() {
+        hasher.write(&[fault.kind as u8]);
+        hasher.write(&fault.frame.to_le_bytes());
+        return hasher.finish();
+    }
+    match &object.geometry {
+        Geometry::Mesh(mesh) => {
+            write_vectors(&mut hasher, &mesh.positions);
+            write_vectors(&mut hasher, &mesh.velocities);
+        }
+        Geometry::Rigid(rigid) => {
+            let turned = rigid.pose.rotation.to_array();
+            let moved = rigid.pose.translation.to_array().into_iter();
+            for value in moved.chain(turned).chain(rigid.velocity.to_array()) {
+                write(&mut hasher, value.to_bits());
+            }
+        }
+    }
+    object.behavior.hash_state(&mut hasher);
+    hasher.finish()
+}
+
+fn write_vectors(hasher: &mut FnvHasher, vectors: &Vectors) {
+    for component in vectors.as_slices() {
+        for value in component {
+            write(hasher, value.to_bits());
+        }
+    }
+}
+
+/// Always little-endian, so that the hash is the same on every machine.
+fn write(hasher: &mut FnvHasher, value: u32) {
+    hasher.write(&value.to_le_bytes());
+}
