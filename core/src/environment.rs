@@ -27,7 +27,10 @@ pub struct Pair {
 ///
 /// A callback that returns an error ends its work unit like one that succeeds: the frame goes on
 /// and the error comes out of [`crate::worker::Worker::step`].
-pub trait Environment: Sync {
+///
+/// The environment itself need not be `Sync`: each worker may step with a value of its own, which
+/// can hold scratch memory.
+pub trait Environment {
     /// What a unit holds: one object, or a block of objects.
     type Object: Send + Sync;
     /// State of an interaction of its own: for a modelled interaction it stays from frame to

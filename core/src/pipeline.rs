@@ -140,6 +140,17 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         self.tables.post.post(&self.tables.unit(to).inbox, stamp, from, message)
     }
 
+    /// Takes every letter that waits in an inbox, in order for each unit: to post them anew where
+    /// the objects have moved to other units, say.
+    pub fn take_letters(&mut self, mut take: impl FnMut(UnitId, From, E::Message)) {
+        let never = self.window.open().next();
+        for (index, unit) in self.tables.units.iter().enumerate() {
+            for (from, message) in self.tables.post.collect(&unit.inbox, never) {
+                take(UnitId(index as u32), from, message);
+            }
+        }
+    }
+
     /// Every unit's object, by exclusive access to the pipeline.
     pub fn objects_mut(&mut self) -> impl Iterator<Item = &mut E::Object> {
         // SAFETY: `&mut self` means that no worker exists, so nobody else has any object; each
