@@ -38,7 +38,12 @@ pub(super) struct Clock([AtomicU64; 4]);
 impl Clock {
     /// Counts the time until the guard is dropped towards a stage.
     pub(super) fn time(&self, stage: Stage) -> Timer<'_> {
-        Timer { nanoseconds: &self.0[stage as usize], began: Instant::now() }
+        Timer { clock: self, stage, began: Instant::now() }
+    }
+
+    /// Counts some time towards a stage.
+    pub(super) fn add(&self, stage: Stage, time: Duration) {
+        self.0[stage as usize].fetch_add(time.as_nanos() as u64, Ordering::Relaxed);
     }
 
     /// What was counted, within so much time of running.
@@ -59,13 +64,13 @@ impl Clock {
 
 /// Counts time until it is dropped.
 pub(super) struct Timer<'a> {
-    nanoseconds: &'a AtomicU64,
+    clock: &'a Clock,
+    stage: Stage,
     began: Instant,
 }
 
 impl Drop for Timer<'_> {
     fn drop(&mut self) {
-        let elapsed = self.began.elapsed().as_nanos() as u64;
-        self.nanoseconds.fetch_add(elapsed, Ordering::Relaxed);
+        self.clock.add(self.stage, self.began.elapsed());
     }
 }

@@ -4,9 +4,13 @@
 //!
 //! [`Block`]: crate::block::Block
 
+mod barrier;
 mod clock;
 mod mail;
+mod rayon;
+mod rayon_overlapped;
 mod serial;
+mod static_;
 mod world;
 
 use std::time::Instant;
@@ -19,9 +23,12 @@ use crate::object::{Object, ObjectId};
 use crate::render::Renderer;
 use crate::stages::PairCount;
 
+pub use self::rayon::RayonExecutor;
 pub use clock::{Stage, StageSeconds};
 pub use mail::{Letter, Mail};
+pub use rayon_overlapped::RayonOverlappedExecutor;
 pub use serial::SerialExecutor;
+pub use static_::StaticExecutor;
 
 /// The ways to drive an environment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -90,9 +90,9 @@ impl SerialExecutor {
         let World { stages, blocks, .. } = &mut self.world;
         for (index, block) in blocks.iter_mut().enumerate() {
             let outcomes = self.candidates.of_block(index).map(|place| &self.outcomes[place]);
-            let segments = outcomes.flat_map(Outcome::segments);
+            outcomes.flat_map(Outcome::segments).for_each(|segment| block.receive(segment));
             let mut post = |from, to, message| self.outbox.push((from, to, message));
-            stages.update(self.frame, block, segments, self.mail.letters(), &mut post);
+            stages.update(self.frame, block, self.mail.letters(), &mut post);
         }
         world::empty_into(&mut self.outbox, &mut self.mail);
     }

@@ -52,10 +52,6 @@ impl World {
             self.blocking.fill(index, block);
         }
     }
-
-    pub(super) fn grain(&self) -> Grain {
-        self.grain
-    }
 }
 
 /// Whether blocks of this grain are formed anew before a frame.
