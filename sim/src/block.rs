@@ -3,7 +3,7 @@
 use crate::behavior::{Segment, Workspace};
 use crate::geometry::{Bounds, LANES, Lanes};
 use crate::interaction::{Contact, group_set};
-use crate::object::Object;
+use crate::object::{Object, ObjectId};
 
 /// One or more objects that go through the stages together, in ascending order of their numbers.
 #[derive(Default)]
@@ -28,6 +28,14 @@ impl Block {
         self.bounds.unwrap_or(Bounds::EMPTY)
     }
 
+    /// Takes over a segment of this frame's interaction results. Before a block is updated it must be
+    /// given all that concern its objects, in any order; others are ignored.
+    pub fn receive(&mut self, segment: &[Contact]) {
+        if segment.first().is_some_and(|record| self.find(record.object).is_some()) {
+            self.gathered.push(segment);
+        }
+    }
+
     /// The groups of its objects that may interact, a bit each.
     pub(crate) fn groups(&self) -> u32 {
         self.groups
@@ -50,7 +58,7 @@ impl Block {
     }
 
     /// The place of an object among [`Block::objects`].
-    pub(crate) fn find(&self, id: crate::object::ObjectId) -> Option<usize> {
+    fn find(&self, id: ObjectId) -> Option<usize> {
         self.objects.binary_search_by_key(&id, Object::id).ok()
     }
 }

@@ -11,6 +11,7 @@
 pub mod behavior;
 pub mod block;
 pub mod blocking;
+pub mod executor;
 pub mod geometry;
 pub mod interaction;
 pub mod message;

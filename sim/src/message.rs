@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::object::{Object, ObjectId};
+use crate::object::Object;
 
 /// Something told to an object. It is processed immediately before the object's next update; what is
 /// posted in frame f's updates is processed in frame f+1's, ordered by sender and then by the order
@@ -32,15 +32,4 @@ pub enum Message {
 pub trait Custom: fmt::Debug + Send + Sync {
     /// Changes the object as the message says.
     fn process(&self, object: &mut Object);
-}
-
-/// A message on its way.
-#[derive(Debug)]
-pub struct Letter {
-    /// Whom it is for.
-    pub to: ObjectId,
-    /// Who sent it.
-    pub from: ObjectId,
-    /// What it says.
-    pub message: Message,
 }

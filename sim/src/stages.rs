@@ -119,24 +119,24 @@ impl Stages {
 
     /// Updates the objects of a block.
     ///
-    /// `segments` are results of this frame's interactions in any order, among them all that concern
-    /// objects of this block; others are ignored. `mail` is (to, from, message) for objects of this
+    /// The block must have [received] this frame's interaction results. `mail` is (to, from, message) for objects of this
     /// block, for each in the order in which it is to be processed: by sender, then by order of
     /// posting; messages to other objects are ignored. `post` is given (from, to, message) for each
     /// message that an object sends.
     ///
     /// An object whose callback panics, whose state is not finite afterwards, or that is over budget
     /// is quarantined.
+    ///
+    /// [received]: Block::receive
     pub fn update<'m>(
         &self,
         frame: u64,
         block: &mut Block,
-        segments: impl Iterator<Item = &'m [Contact]>,
         mail: impl Iterator<Item = (ObjectId, ObjectId, &'m Message)> + Clone,
         post: &mut dyn FnMut(ObjectId, ObjectId, Message),
     ) {
-        gather(block, segments);
         let Gathered { records, segments, workspace } = &mut block.gathered;
+        segments.sort_unstable_by_key(|segment| (segment.object, segment.other));
         let mut rest = segments.as_slice();
         for object in &mut block.objects {
             let own = rest.partition_point(|segment| segment.object <= object.id());
@@ -156,6 +156,7 @@ impl Stages {
             let given = Given { frame, segments, records, workspace: &mut *workspace };
             self.update_object(object, given, own_mail, post);
         }
+        block.gathered.clear();
         block.refresh();
     }
 
@@ -216,15 +217,4 @@ struct Given<'a> {
     segments: &'a [Segment],
     records: &'a [Contact],
     workspace: &'a mut Workspace,
-}
-
-/// Collects the segments that concern the block, by object and then by the other object's number.
-fn gather<'m>(block: &mut Block, segments: impl Iterator<Item = &'m [Contact]>) {
-    block.gathered.clear();
-    for segment in segments {
-        if segment.first().is_some_and(|record| block.find(record.object).is_some()) {
-            block.gathered.push(segment);
-        }
-    }
-    block.gathered.segments.sort_unstable_by_key(|segment| (segment.object, segment.other));
 }

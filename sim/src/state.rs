@@ -12,17 +12,28 @@ use crate::object::{Object, ObjectId};
 ///
 /// An object's state is its positions and velocities bit by bit, what its behaviour remembers, and
 /// whether it is quarantined; of a quarantined object only that counts.
-#[must_use]
-pub fn state_hash<'a>(objects: impl IntoIterator<Item = &'a Object>) -> u64 {
-    let mut hashes: Vec<(ObjectId, u64)> =
-        objects.into_iter().map(|object| (object.id(), object_hash(object))).collect();
-    hashes.sort_unstable();
-    let mut hasher = FnvHasher::default();
-    for (id, hash) in hashes {
-        write(&mut hasher, id.0);
-        hasher.write(&hash.to_le_bytes());
+#[derive(Clone, Debug, Default)]
+pub struct StateHash {
+    hashes: Vec<(ObjectId, u64)>,
+}
+
+impl StateHash {
+    /// Adds an object.
+    pub fn add(&mut self, object: &Object) {
+        self.hashes.push((object.id(), object_hash(object)));
     }
-    hasher.finish()
+
+    /// The hash over all objects added.
+    #[must_use]
+    pub fn finish(mut self) -> u64 {
+        self.hashes.sort_unstable();
+        let mut hasher = FnvHasher::default();
+        for (id, hash) in self.hashes {
+            write(&mut hasher, id.0);
+            hasher.write(&hash.to_le_bytes());
+        }
+        hasher.finish()
+    }
 }
 
 /// The hash over the state of one object.

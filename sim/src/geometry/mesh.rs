@@ -128,9 +128,16 @@ impl Mesh {
         self.positions.is_finite() && self.velocities.is_finite()
     }
 
-    /// Takes over the topology, positions and velocities of another mesh.
-    pub(crate) fn copy_state_from(&mut self, other: &Self) {
-        self.topology.clone_from(&other.topology);
+    /// Becomes a copy of another mesh without giving up memory.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        if !Arc::ptr_eq(&self.topology, &other.topology) {
+            self.clone_from(other);
+            return;
+        }
+        // Bodies of one make may still differ in mass.
+        self.masses.clone_from(&other.masses);
+        self.inverse_masses.clone_from(&other.inverse_masses);
+        self.contact_radius = other.contact_radius;
         self.positions.copy_from(&other.positions);
         self.velocities.copy_from(&other.velocities);
     }

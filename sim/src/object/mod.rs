@@ -174,15 +174,18 @@ impl Object {
         }
     }
 
-    /// Brings an earlier snapshot of the same object up to date; allocates only if the geometry has
-    /// become another kind or size.
+    /// Makes an earlier snapshot one of this object; allocates only if their geometries are of
+    /// different kinds or sizes.
     pub fn snapshot_into(&self, snapshot: &mut Self) {
+        snapshot.id = self.id;
+        snapshot.group = self.group;
+        snapshot.solitary = self.solitary;
         snapshot.quarantined = self.quarantined;
         snapshot.bounds = self.bounds;
         snapshot.visual = self.visual;
         snapshot.drawing = self.drawing;
         match (&self.geometry, &mut snapshot.geometry) {
-            (Geometry::Mesh(from), Geometry::Mesh(to)) => to.copy_state_from(from),
+            (Geometry::Mesh(from), Geometry::Mesh(to)) => to.copy_from(from),
             (from, to) => to.clone_from(from),
         }
     }

@@ -1,0 +1,115 @@
+//! Executors: what drives the four stages, frame by frame.
+//!
+//! Every executor calls the same [`Stages`] on the same [`Block`]s and comes to the same bits.
+//!
+//! [`Block`]: crate::block::Block
+
+mod barrier;
+mod clock;
+mod mail;
+mod rayon;
+mod rayon_overlapped;
+mod serial;
+mod static_;
+mod world;
+
+use std::time::Instant;
+
+use thiserror::Error;
+
+use crate::blocking::BlockingError;
+use crate::message::Message;
+use crate::object::{Object, ObjectId};
+use crate::render::Renderer;
+use crate::stages::PairCount;
+
+pub use self::rayon::RayonExecutor;
+pub use clock::{Stage, StageSeconds};
+pub use mail::{Letter, Mail};
+pub use rayon_overlapped::RayonOverlappedExecutor;
+pub use serial::SerialExecutor;
+pub use static_::StaticExecutor;
+
+/// The ways to drive an environment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ExecutorKind {
+    /// The dual-frame pipeline.
+    #[default]
+    Pipeline,
+    /// One thread, stage after stage: the serial time that speed-ups refer to (§7.2).
+    Serial,
+    /// Long-lived threads, equal shares fixed beforehand, a barrier after each stage.
+    Static,
+    /// Rayon's work stealing, stage after stage.
+    Rayon,
+    /// As [`ExecutorKind::Rayon`], but a copy of each frame is rendered beside the next frame.
+    RayonOverlapped,
+}
+
+/// Why an executor cannot be built.
+#[derive(Debug, Error)]
+pub enum ExecutorError {
+    /// The objects cannot be grouped.
+    #[error(transparent)]
+    Blocking(#[from] BlockingError),
+    /// The number of threads is not allowed.
+    #[error("{threads} threads were asked for; there can be 1 to {MAX_THREADS}")]
+    Threads {
+        /// The number asked for.
+        threads: usize,
+    },
+    /// The system gave no thread.
+    #[error("a worker thread could not be started")]
+    Spawn(#[source] std::io::Error),
+    /// Rayon's pool could not be built.
+    #[error("the thread pool could not be started")]
+    Pool(#[from] ::rayon::ThreadPoolBuildError),
+}
+
+/// The most threads an executor may have.
+pub const MAX_THREADS: usize = 256;
+
+/// What is known of a frame once it is swapped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameRecord {
+    /// The frame, counted from 0.
+    pub frame: u64,
+    /// When it was swapped.
+    pub swapped: Instant,
+    /// What its interaction stage counted.
+    pub pairs: PairCount,
+}
+
+/// Something that advances an environment frame by frame.
+pub trait Executor {
+    /// Advances by `frames` frames. Every frame's objects go to the renderer, then the frame is
+    /// swapped and `on_frame` is told, in the order of the frames; when this returns, all of them are
+    /// swapped. The renderer is called by the calling thread only.
+    fn advance(
+        &mut self,
+        frames: u64,
+        renderer: &mut dyn Renderer,
+        on_frame: &mut dyn FnMut(&FrameRecord),
+    );
+
+    /// The number of frames done so far, which is the number of the next one.
+    fn frame(&self) -> u64;
+
+    /// Shows every object in its present state, in no particular order.
+    fn visit(&self, visit: &mut dyn FnMut(&Object));
+
+    /// Posts a message from outside, which is processed in the next frame after all messages that
+    /// objects sent.
+    fn post(&mut self, to: ObjectId, message: Message);
+
+    /// What each worker spent its time on since the executor was built.
+    fn stage_seconds(&self) -> Vec<StageSeconds>;
+}
+
+/// The state hash of an executor's objects.
+#[must_use]
+pub fn state_hash(executor: &dyn Executor) -> u64 {
+    let mut hashes = crate::state::StateHash::default();
+    executor.visit(&mut |object| hashes.add(object));
+    hashes.finish()
+}

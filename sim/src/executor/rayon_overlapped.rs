@@ -1,0 +1,143 @@
+//! Rayon, with each frame rendered from a copy beside the next frame.
+
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use rayon::ThreadPool;
+
+use super::clock::{Stage, StageSeconds};
+use super::rayon::{Engine, pool};
+use super::{Executor, ExecutorError, FrameRecord, world};
+use crate::block::Block;
+use crate::blocking::Grain;
+use crate::message::Message;
+use crate::object::{Object, ObjectId};
+use crate::render::Renderer;
+use crate::scene::Scene;
+use crate::stages::{PairCount, draw};
+
+/// As [`RayonExecutor`], but every update also copies what a renderer sees, and the calling thread
+/// renders that copy while the pool computes the next frame: the best overlap of rendering that can
+/// be had without the pipeline. The calling thread is one more than the pool's.
+///
+/// [`RayonExecutor`]: super::RayonExecutor
+pub struct RayonOverlappedExecutor {
+    engine: Engine,
+    pool: ThreadPool,
+    used: SyncSender<Picture>,
+    unused: Receiver<Picture>,
+    running: Duration,
+}
+
+/// What a renderer sees of one frame, block by block. The locks are never contended.
+type Picture = Vec<Mutex<Vec<Object>>>;
+
+/// One picture is rendered while the next is taken.
+const PICTURES: usize = 2;
+
+impl RayonOverlappedExecutor {
+    /// Takes over a scene.
+    ///
+    /// # Errors
+    /// No or too many threads, objects that cannot be grouped, or a pool that cannot be started.
+    pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
+        let engine = Engine::new(scene, grain, threads)?;
+        let copy =
+            |block: &Block| Mutex::new(block.objects().iter().map(Object::snapshot).collect());
+        let blocks = &engine.world.blocks;
+        let (used, unused) = sync_channel(PICTURES);
+        for _ in 0..PICTURES {
+            give_back(&used, blocks.iter().map(copy).collect());
+        }
+        Ok(Self { engine, pool: pool(threads)?, used, unused, running: Duration::ZERO })
+    }
+}
+
+impl Executor for RayonOverlappedExecutor {
+    fn advance(
+        &mut self,
+        frames: u64,
+        renderer: &mut dyn Renderer,
+        on_frame: &mut dyn FnMut(&FrameRecord),
+    ) {
+        let began = Instant::now();
+        let (taken_in, taken_out) = sync_channel(PICTURES);
+        let (engine, pool, unused) = (&mut self.engine, &self.pool, &mut self.unused);
+        let mut render_time = Duration::ZERO;
+        std::thread::scope(|scope| {
+            scope.spawn(move || pool.install(|| compute(engine, frames, unused, &taken_in)));
+            for Taken { frame, pairs, picture } in &taken_out {
+                let began = Instant::now();
+                show(&picture, renderer);
+                renderer.swap(frame);
+                render_time += began.elapsed();
+                on_frame(&FrameRecord { frame, swapped: Instant::now(), pairs });
+                give_back(&self.used, picture);
+            }
+        });
+        self.engine.workers[0].clock.add(Stage::Render, render_time);
+        self.running += began.elapsed();
+    }
+
+    fn frame(&self) -> u64 {
+        self.engine.frame
+    }
+
+    fn visit(&self, visit: &mut dyn FnMut(&Object)) {
+        world::visit(&self.engine.world.blocks, visit);
+    }
+
+    fn post(&mut self, to: ObjectId, message: Message) {
+        self.engine.mail.collect(ObjectId::HOST, to, message);
+    }
+
+    fn stage_seconds(&self) -> Vec<StageSeconds> {
+        self.engine.stage_seconds(self.running)
+    }
+}
+
+/// A frame ready to be rendered.
+struct Taken {
+    frame: u64,
+    pairs: PairCount,
+    picture: Picture,
+}
+
+/// Computes frames and takes a picture of each, until nobody wants them any more.
+fn compute(
+    engine: &mut Engine,
+    frames: u64,
+    unused: &mut Receiver<Picture>,
+    taken: &SyncSender<Taken>,
+) {
+    for _ in 0..frames {
+        let Ok(picture) = unused.recv() else { return };
+        let frame = engine.frame;
+        let pairs = engine.compute(|index, block| copy(block, &picture[index]));
+        if taken.send(Taken { frame, pairs, picture }).is_err() {
+            return;
+        }
+    }
+}
+
+/// Copies what a renderer sees of a block, whose number of objects never changes.
+fn copy(block: &Block, copies: &Mutex<Vec<Object>>) {
+    let mut copies = copies.lock().unwrap_or_else(PoisonError::into_inner);
+    for (object, copy) in block.objects().iter().zip(copies.iter_mut()) {
+        object.snapshot_into(copy);
+    }
+}
+
+fn show(picture: &Picture, renderer: &mut dyn Renderer) {
+    for copies in picture {
+        for object in copies.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+            draw(object, renderer);
+        }
+    }
+}
+
+fn give_back(used: &SyncSender<Picture>, picture: Picture) {
+    // The channel has room for all pictures, and its other end is kept beside this one.
+    let _ = used.send(picture);
+}

@@ -1,0 +1,147 @@
+//! One thread, stage after stage.
+
+use std::time::{Duration, Instant};
+
+use super::clock::{Clock, Stage, StageSeconds};
+use super::mail::Mail;
+use super::world::{self, Candidates, Outbox, Outcome, World};
+use super::{Executor, ExecutorError, FrameRecord};
+use crate::block::Block;
+use crate::blocking::Grain;
+use crate::geometry::Bounds;
+use crate::interaction::Scratch;
+use crate::message::Message;
+use crate::object::{Object, ObjectId};
+use crate::render::Renderer;
+use crate::scene::Scene;
+use crate::stages::PairCount;
+
+/// One thread, stage after stage: no locks, no queues, nothing of the pipeline.
+pub struct SerialExecutor {
+    world: World,
+    bounds: Vec<Bounds>,
+    found: Vec<u32>,
+    candidates: Candidates,
+    outcomes: Vec<Outcome>,
+    outbox: Outbox,
+    mail: Mail,
+    scratch: Scratch,
+    clock: Clock,
+    running: Duration,
+    frame: u64,
+}
+
+impl SerialExecutor {
+    /// Takes over a scene.
+    ///
+    /// # Errors
+    /// Objects that cannot be grouped.
+    pub fn new(scene: Scene, grain: Grain) -> Result<Self, ExecutorError> {
+        let world = World::new(scene, grain, 1)?;
+        let blocks = world.blocks.len();
+        Ok(Self {
+            bounds: Vec::with_capacity(blocks),
+            found: world::found_list(),
+            candidates: Candidates::new(blocks),
+            outcomes: (0..world::first_outcomes(blocks)).map(|_| Outcome::new()).collect(),
+            outbox: world::outbox(),
+            mail: Mail::new(),
+            scratch: Scratch::new(),
+            clock: Clock::default(),
+            running: Duration::ZERO,
+            frame: 0,
+            world,
+        })
+    }
+
+    fn broad_phase(&mut self) {
+        let _timer = self.clock.time(Stage::BroadPhase);
+        let World { stages, blocks, partners, .. } = &self.world;
+        self.bounds.clear();
+        self.bounds.extend(blocks.iter().map(Block::bounds));
+        self.candidates.clear();
+        for first in 0..blocks.len() {
+            let may_touch = |second: usize| {
+                let (first, second) = world::pair(blocks, [first as u32, second as u32]);
+                world::may_touch(stages, first, second)
+            };
+            partners.find(first, &self.bounds, may_touch, &mut self.found);
+            self.candidates.extend(first, &self.found);
+        }
+    }
+
+    fn interact(&mut self) -> PairCount {
+        let _timer = self.clock.time(Stage::Interaction);
+        let pairs = &self.candidates.pairs;
+        if self.outcomes.len() < pairs.len() {
+            self.outcomes.resize_with(pairs.len(), Outcome::new);
+        }
+        let mut count = PairCount::default();
+        for (&pair, outcome) in pairs.iter().zip(&mut self.outcomes) {
+            let (first, second) = world::pair(&self.world.blocks, pair);
+            outcome.compute(&self.world.stages, first, second, &mut self.scratch);
+            count += outcome.pairs;
+        }
+        count
+    }
+
+    fn update(&mut self) {
+        let _timer = self.clock.time(Stage::Update);
+        let World { stages, blocks, .. } = &mut self.world;
+        for (index, block) in blocks.iter_mut().enumerate() {
+            let outcomes = self.candidates.of_block(index).map(|place| &self.outcomes[place]);
+            outcomes.flat_map(Outcome::segments).for_each(|segment| block.receive(segment));
+            let mut post = |from, to, message| self.outbox.push((from, to, message));
+            stages.update(self.frame, block, self.mail.letters(), &mut post);
+        }
+        world::empty_into(&mut self.outbox, &mut self.mail);
+    }
+
+    fn render(&mut self, renderer: &mut dyn Renderer) {
+        let _timer = self.clock.time(Stage::Render);
+        for block in &self.world.blocks {
+            self.world.stages.render(block, renderer);
+        }
+        renderer.swap(self.frame);
+    }
+}
+
+impl Executor for SerialExecutor {
+    fn advance(
+        &mut self,
+        frames: u64,
+        renderer: &mut dyn Renderer,
+        on_frame: &mut dyn FnMut(&FrameRecord),
+    ) {
+        let began = Instant::now();
+        for _ in 0..frames {
+            if self.world.regroups_before(self.frame) {
+                self.world.regroup();
+            }
+            self.mail.turn();
+            self.broad_phase();
+            let pairs = self.interact();
+            self.update();
+            self.render(renderer);
+            on_frame(&FrameRecord { frame: self.frame, swapped: Instant::now(), pairs });
+            self.frame += 1;
+        }
+        self.running += began.elapsed();
+    }
+
+    fn frame(&self) -> u64 {
+        self.frame
+    }
+
+    fn visit(&self, visit: &mut dyn FnMut(&Object)) {
+        world::visit(&self.world.blocks, visit);
+    }
+
+    fn post(&mut self, to: ObjectId, message: Message) {
+        self.mail.collect(ObjectId::HOST, to, message);
+    }
+
+    fn stage_seconds(&self) -> Vec<StageSeconds> {
+        vec![self.clock.seconds(self.running)]
+    }
+}

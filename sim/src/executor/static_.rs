@@ -1,0 +1,305 @@
+//! Long-lived threads with equal shares fixed beforehand.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use super::barrier::Barrier;
+use super::clock::{Clock, Stage, StageSeconds};
+use super::mail::Mail;
+use super::world::{self, Candidates, Outbox, Outcome, Partners, World};
+use super::{Executor, ExecutorError, FrameRecord, MAX_THREADS};
+use crate::block::Block;
+use crate::blocking::{Blocking, Grain};
+use crate::geometry::Bounds;
+use crate::interaction::Scratch;
+use crate::message::Message;
+use crate::object::{Object, ObjectId};
+use crate::render::Renderer;
+use crate::scene::Scene;
+use crate::stages::{PairCount, Stages};
+
+/// Long-lived threads, each with its equal share of blocks and of candidates, and a barrier after each
+/// stage. The calling thread is one of them, and renders while the others wait.
+pub struct StaticExecutor {
+    shared: Arc<Shared>,
+    threads: Vec<JoinHandle<()>>,
+    blocking: Blocking,
+    grain: Grain,
+    running: Duration,
+    frame: u64,
+}
+
+/// What the threads share. The barriers keep them apart, so no lock is ever contended for writing.
+struct Shared {
+    stages: Stages,
+    partners: Partners,
+    blocks: Vec<RwLock<Block>>,
+    found: Vec<Mutex<Vec<u32>>>,
+    outboxes: Vec<Mutex<Outbox>>,
+    plan: RwLock<Plan>,
+    barrier: Barrier,
+    clocks: Vec<Clock>,
+    frame: AtomicU64,
+    stop: AtomicBool,
+}
+
+/// What the calling thread prepares for all.
+struct Plan {
+    bounds: Vec<Bounds>,
+    candidates: Candidates,
+    outcomes: Vec<RwLock<Outcome>>,
+    mail: Mail,
+}
+
+impl StaticExecutor {
+    /// Takes over a scene.
+    ///
+    /// # Errors
+    /// No or too many threads, objects that cannot be grouped, or a thread that cannot be started.
+    pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
+        if !(1..=MAX_THREADS).contains(&threads) {
+            return Err(ExecutorError::Threads { threads });
+        }
+        let world = World::new(scene, grain, threads)?;
+        let count = world.blocks.len();
+        let outcome = |_| RwLock::new(Outcome::new());
+        let plan = Plan {
+            bounds: Vec::with_capacity(count),
+            candidates: Candidates::new(count),
+            outcomes: (0..world::first_outcomes(count)).map(outcome).collect(),
+            mail: Mail::new(),
+        };
+        let shared = Arc::new(Shared {
+            stages: world.stages,
+            partners: world.partners,
+            blocks: world.blocks.into_iter().map(RwLock::new).collect(),
+            found: (0..count).map(|_| Mutex::new(world::found_list())).collect(),
+            outboxes: (0..count).map(|_| Mutex::new(world::outbox())).collect(),
+            plan: RwLock::new(plan),
+            barrier: Barrier::new(threads),
+            clocks: (0..threads).map(|_| Clock::default()).collect(),
+            frame: AtomicU64::new(0),
+            stop: AtomicBool::new(false),
+        });
+        let threads = start(&shared, threads)?;
+        let (blocking, running) = (world.blocking, Duration::ZERO);
+        Ok(Self { shared, threads, blocking, grain, running, frame: 0 })
+    }
+
+    /// Forms the blocks anew.
+    fn regroup(&mut self) {
+        for block in &self.shared.blocks {
+            self.blocking.drain(&mut write(block));
+        }
+        self.blocking.split();
+        for (index, block) in self.shared.blocks.iter().enumerate() {
+            self.blocking.fill(index, &mut write(block));
+        }
+    }
+
+    /// Prepares the next frame while the other threads wait.
+    fn prepare(&mut self) {
+        if world::regroups_before(self.grain, self.frame) {
+            self.regroup();
+        }
+        let mut plan = write(&self.shared.plan);
+        plan.mail.turn();
+        plan.bounds.clear();
+        plan.bounds.extend(self.shared.blocks.iter().map(|block| read(block).bounds()));
+        self.shared.frame.store(self.frame, Ordering::Relaxed);
+    }
+
+    fn render(&self, renderer: &mut dyn Renderer) {
+        let _timer = self.shared.clocks[0].time(Stage::Render);
+        for block in &self.shared.blocks {
+            self.shared.stages.render(&read(block), renderer);
+        }
+        renderer.swap(self.frame);
+    }
+}
+
+/// Starts all threads but the calling one.
+fn start(shared: &Arc<Shared>, threads: usize) -> Result<Vec<JoinHandle<()>>, ExecutorError> {
+    let mut started = Vec::with_capacity(threads - 1);
+    for worker in 1..threads {
+        let theirs = Arc::clone(shared);
+        let builder = std::thread::Builder::new().name(format!("static {worker}"));
+        match builder.spawn(move || theirs.work(worker)) {
+            Ok(thread) => started.push(thread),
+            Err(error) => {
+                // Those that run wait for a frame that will never begin with all of them there.
+                shared.stop.store(true, Ordering::Relaxed);
+                (started.len()..threads).for_each(|_| shared.barrier.arrive());
+                return Err(ExecutorError::Spawn(error));
+            }
+        }
+    }
+    Ok(started)
+}
+
+impl Shared {
+    /// A thread's life: frames until it is told to stop.
+    fn work(&self, worker: usize) {
+        let mut scratch = Scratch::new();
+        loop {
+            self.barrier.wait();
+            if self.stop.load(Ordering::Relaxed) {
+                return;
+            }
+            self.compute(worker, &mut scratch);
+        }
+    }
+
+    /// One thread's share of a frame.
+    fn compute(&self, worker: usize, scratch: &mut Scratch) {
+        self.broad_phase(worker);
+        self.barrier.wait();
+        if worker == 0 {
+            self.collect();
+        }
+        self.barrier.wait();
+        self.interact(worker, scratch);
+        self.barrier.wait();
+        self.update(worker);
+        self.barrier.wait();
+    }
+
+    fn broad_phase(&self, worker: usize) {
+        let _timer = self.clocks[worker].time(Stage::BroadPhase);
+        let plan = read(&self.plan);
+        for first in self.share(worker, self.blocks.len()) {
+            let own = read(&self.blocks[first]);
+            let may_touch = |other: usize| {
+                let second = (other != first).then(|| read(&self.blocks[other]));
+                world::may_touch(&self.stages, &own, second.as_deref())
+            };
+            self.partners.find(first, &plan.bounds, may_touch, &mut lock(&self.found[first]));
+        }
+    }
+
+    /// Makes one list of what the broad phase found.
+    fn collect(&self) {
+        let mut plan = write(&self.plan);
+        plan.candidates.clear();
+        for (first, found) in self.found.iter().enumerate() {
+            plan.candidates.extend(first, &lock(found));
+        }
+        let wanted = plan.candidates.pairs.len();
+        if plan.outcomes.len() < wanted {
+            plan.outcomes.resize_with(wanted, || RwLock::new(Outcome::new()));
+        }
+    }
+
+    fn interact(&self, worker: usize, scratch: &mut Scratch) {
+        let _timer = self.clocks[worker].time(Stage::Interaction);
+        let plan = read(&self.plan);
+        for place in self.share(worker, plan.candidates.pairs.len()) {
+            let [first, second] = plan.candidates.pairs[place];
+            let other = (first != second).then(|| read(&self.blocks[second as usize]));
+            let first = read(&self.blocks[first as usize]);
+            let mut outcome = write(&plan.outcomes[place]);
+            outcome.compute(&self.stages, &first, other.as_deref(), scratch);
+        }
+    }
+
+    fn update(&self, worker: usize) {
+        let _timer = self.clocks[worker].time(Stage::Update);
+        let frame = self.frame.load(Ordering::Relaxed);
+        let plan = read(&self.plan);
+        for index in self.share(worker, self.blocks.len()) {
+            let mut outbox = lock(&self.outboxes[index]);
+            let mut post = |from, to, message| outbox.push((from, to, message));
+            let mut block = write(&self.blocks[index]);
+            for place in plan.candidates.of_block(index) {
+                read(&plan.outcomes[place]).segments().for_each(|segment| block.receive(segment));
+            }
+            self.stages.update(frame, &mut block, plan.mail.letters(), &mut post);
+        }
+    }
+
+    /// A worker's part of so many items.
+    fn share(&self, worker: usize, items: usize) -> Range<usize> {
+        let workers = self.clocks.len();
+        items * worker / workers..items * (worker + 1) / workers
+    }
+
+    /// What the last frame's interactions counted; its messages go to the mail.
+    fn finish(&self) -> PairCount {
+        let mut plan = write(&self.plan);
+        for outbox in &self.outboxes {
+            world::empty_into(&mut lock(outbox), &mut plan.mail);
+        }
+        let done = plan.outcomes.iter().take(plan.candidates.pairs.len());
+        done.fold(PairCount::default(), |mut sum, outcome| {
+            sum += read(outcome).pairs;
+            sum
+        })
+    }
+}
+
+impl Executor for StaticExecutor {
+    fn advance(
+        &mut self,
+        frames: u64,
+        renderer: &mut dyn Renderer,
+        on_frame: &mut dyn FnMut(&FrameRecord),
+    ) {
+        let began = Instant::now();
+        let mut scratch = Scratch::new();
+        for _ in 0..frames {
+            self.prepare();
+            self.shared.barrier.wait();
+            self.shared.compute(0, &mut scratch);
+            let pairs = self.shared.finish();
+            self.render(renderer);
+            on_frame(&FrameRecord { frame: self.frame, swapped: Instant::now(), pairs });
+            self.frame += 1;
+        }
+        self.running += began.elapsed();
+    }
+
+    fn frame(&self) -> u64 {
+        self.frame
+    }
+
+    fn visit(&self, visit: &mut dyn FnMut(&Object)) {
+        for block in &self.shared.blocks {
+            read(block).objects().iter().for_each(&mut *visit);
+        }
+    }
+
+    fn post(&mut self, to: ObjectId, message: Message) {
+        write(&self.shared.plan).mail.collect(ObjectId::HOST, to, message);
+    }
+
+    fn stage_seconds(&self) -> Vec<StageSeconds> {
+        self.shared.clocks.iter().map(|clock| clock.seconds(self.running)).collect()
+    }
+}
+
+impl Drop for StaticExecutor {
+    fn drop(&mut self) {
+        self.shared.stop.store(true, Ordering::Relaxed);
+        self.shared.barrier.wait();
+        for thread in self.threads.drain(..) {
+            // A thread ends by panic only through a fault of the executor's own; there is nobody to
+            // tell any more.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn read<T>(lock: &RwLock<T>) -> RwLockReadGuard<'_, T> {
+    lock.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn write<T>(lock: &RwLock<T>) -> RwLockWriteGuard<'_, T> {
+    lock.write().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
