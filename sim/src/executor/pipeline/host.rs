@@ -164,6 +164,7 @@ impl<'s> Environment for Host<'s> {
         }
         let mail = letters.iter().map(|(from, parcel)| (parcel.to, *from, &parcel.message));
         let segments = inputs.interactions().flat_map(|interaction| interaction.contacts);
+        segments.for_each(|segment| block.receive(segment));
         let mut outcome = Ok(());
         let mut post = |from: ObjectId, to: ObjectId, message| {
             // A letter to nobody is lost, as `Input::post` says.
@@ -172,7 +173,7 @@ impl<'s> Environment for Host<'s> {
                 outcome = Err(rejected.full);
             }
         };
-        shared.stages.update(shared.number(frame), block, segments, mail, &mut post);
+        shared.stages.update(shared.number(frame), block, mail, &mut post);
         outcome
     }
 
