@@ -5,8 +5,11 @@
 //! condition variables: they would hand out ordering that the bells have to give.
 
 use super::pipeline::{Screen, Setup, build, build_with, step, verify};
-use super::{Guarded, Model, Role, check, lend, together};
+use super::{Guarded, Model, Role, check, lend, lock, together};
+use dualframe_core_model::stage::Stage;
 use dualframe_core_model::wait::{Bell, Epoch, Waiting};
+use dualframe_core_model::worker::Step;
+use loom::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Mutex;
 
 pub(crate) const ALL: &[Model] = &[
@@ -24,14 +27,14 @@ fn ring_shows_work() {
         let screen: Screen = lend(Guarded::new(0));
         let mut updater = pipeline.worker();
         // Entered; the update is carried.
-        assert!(step(&mut updater, world));
-        let update: Role<bool> = Box::new(move || step(&mut updater, world));
+        assert_ne!(step(&mut updater, world), Step::Idle);
+        let update: Role<bool> = Box::new(move || step(&mut updater, world) != Step::Idle);
         let render: Role<bool> = Box::new(move || {
             let mut worker = pipeline.worker();
             let Ok(token) = pipeline.token(screen) else { panic!("a token is left") };
             assert!(worker.hold(token).is_ok());
             worker.wait();
-            let worked = step(&mut worker, world);
+            let worked = step(&mut worker, world) != Step::Idle;
             assert!(worked, "woken for nothing");
             worked
         });
@@ -55,7 +58,7 @@ fn all_sleepers_end() {
                 }
                 let mut worked = 0;
                 while !pipeline.finished() {
-                    if step(&mut worker, world) {
+                    if step(&mut worker, world) != Step::Idle {
                         worked += 1;
                     } else {
                         worker.wait();
@@ -82,7 +85,7 @@ impl Waiting for Noted {
     }
 
     fn wake(&self, bell: &Bell, count: u32) {
-        super::lock(self.0).push((bell.is_for_holders(), count));
+        lock(self.0).push((bell.is_for_holders(), count));
     }
 }
 
@@ -96,14 +99,14 @@ fn render_wakes_holders_only() {
         let (pipeline, world) = build_with(setup, Noted(woken));
         let screen: Screen = lend(Guarded::new(0));
         let mut updater = pipeline.worker();
-        assert!(step(&mut updater, world));
+        assert_ne!(step(&mut updater, world), Step::Idle);
         let update: Role<()> = Box::new(move || {
             // Queues the rendering and announces it; then takes the token and renders.
-            assert!(step(&mut updater, world));
-            assert!(super::lock(woken).is_empty(), "nobody who could render sleeps");
+            assert_ne!(step(&mut updater, world), Step::Idle);
+            assert!(lock(woken).is_empty(), "nobody who could render sleeps");
             let Ok(token) = pipeline.token(screen) else { panic!("a token is left") };
             assert!(updater.hold(token).is_ok());
-            assert!(step(&mut updater, world));
+            assert_ne!(step(&mut updater, world), Step::Idle);
         });
         let sleep: Role<()> = Box::new(move || {
             let worker = pipeline.worker();
@@ -112,13 +115,95 @@ fn render_wakes_holders_only() {
         });
         together(order, vec![update, sleep]);
         verify(pipeline, world);
-        super::lock(woken).clone()
+        lock(woken).clone()
     });
 }
 
-/// Wakes one sleeper, as a futex does, and never the last who came.
-struct One(&'static Mutex<Vec<usize>>);
+/// Sleeps and wakes as a futex does: the epoch is compared under a lock, and one call wakes one.
+struct One {
+    /// Guards the comparison and the choice; loom's, as a futex orders its callers too.
+    bucket: loom::sync::Mutex<()>,
+    asleep: Mutex<Vec<(bool, &'static AtomicBool)>>,
+    /// This thread's sleep returns at once, as every sleep may.
+    restless: Mutex<Option<loom::thread::ThreadId>>,
+}
 
-/// A worker is woken for work and leaves instead, and so does the one who announced it: the other
-/// sleeper is called.
-fn leaver_passes_it_on() {}
+impl Waiting for One {
+    fn sleep(&self, bell: &Bell, seen: Epoch) {
+        if *lock(&self.restless) == Some(loom::thread::current().id()) {
+            return;
+        }
+        let woken = {
+            let _bucket = self.bucket.lock().unwrap();
+            if bell.rung_since(seen) {
+                return;
+            }
+            let woken: &AtomicBool = lend(AtomicBool::new(false));
+            lock(&self.asleep).push((bell.is_for_holders(), woken));
+            woken
+        };
+        while !woken.load(Ordering::Acquire) {
+            loom::hint::spin_loop();
+        }
+    }
+
+    fn wake(&self, bell: &Bell, count: u32) {
+        let _bucket = self.bucket.lock().unwrap();
+        for _ in 0..count {
+            let mut asleep = lock(&self.asleep);
+            let Some(at) = asleep.iter().position(|at| at.0 == bell.is_for_holders()) else {
+                break;
+            };
+            asleep.remove(at).1.store(true, Ordering::Release);
+        }
+    }
+}
+
+/// A worker announces one update that it queued, and is suspended. Of two that wait, one leaves
+/// when it wakes, whatever for: the other does the update. It may hold the token, and wait at
+/// another bell; and the one that leaves may have woken by itself.
+fn leaver_passes_it_on() {
+    let all = [[false, false], [false, true], [true, false], [true, true]];
+    check("bell::leaver_passes_it_on", Some(2), 12, all, |order| {
+        let [holder, restless] = [order / 6 == 1, order / 3 % 2 == 1];
+        let setup = Setup { frames: 1, ..Setup::default() };
+        let waiting: &One = lend(One {
+            bucket: loom::sync::Mutex::new(()),
+            asleep: Mutex::default(),
+            restless: Mutex::default(),
+        });
+        let (pipeline, world) = build_with(setup, waiting);
+        let screen: Screen = lend(Guarded::new(0));
+        let suspended = lend(pipeline.worker());
+        // Both units enter; their interaction is carried.
+        for _ in 0..2 {
+            assert_ne!(step(suspended, world), Step::Idle);
+        }
+        let interact: Role<Step> = Box::new(move || step(suspended, world));
+        let leave: Role<Step> = Box::new(move || {
+            if restless {
+                *lock(&waiting.restless) = Some(loom::thread::current().id());
+            }
+            let worker = pipeline.worker();
+            worker.wait();
+            Step::Idle
+        });
+        let stay: Role<Step> = Box::new(move || {
+            let mut worker = pipeline.worker();
+            if holder {
+                let Ok(token) = pipeline.token(screen) else { panic!("a token is left") };
+                assert!(worker.hold(token).is_ok());
+            }
+            loop {
+                let done = step(&mut worker, world);
+                if done != Step::Idle {
+                    return done;
+                }
+                worker.wait();
+            }
+        });
+        let done = together(order, vec![interact, leave, stay]);
+        assert_eq!(done[2], Step::Worked(Stage::Update), "the update was done");
+        [holder, restless]
+    });
+}

@@ -7,6 +7,7 @@ pub(crate) const ALL: &[Model] = &[
     ("latest::one_reader", one_reader),
     ("latest::slots_are_reused", slots_are_reused),
     ("latest::two_readers", two_readers),
+    ("latest::reader_is_replaced", reader_is_replaced),
     ("latest::readers_are_limited", readers_are_limited),
 ];
 
@@ -74,6 +75,38 @@ fn two_readers() {
         let seen = together(order, vec![write, read(), read()]);
         [seen[1], seen[2]]
     });
+}
+
+/// A reader leaves, another takes its place, and the writer has a slot for each publication: it
+/// sees the one leave whenever it has seen the other enter.
+fn reader_is_replaced() {
+    check(
+        "latest::reader_is_replaced",
+        Some(3),
+        3,
+        [None, Some(0), Some(1), Some(2), Some(3)],
+        |order| {
+            let (mut writer, readers) = lend(Latest::<_, 3>::new(value(0))).split();
+            let mut first = readers.reader().unwrap();
+            let write: Role<Option<u32>> = Box::new(move || {
+                (1..=3).for_each(|number| writer.publish(value(number)));
+                None
+            });
+            let leave: Role<Option<u32>> = Box::new(move || {
+                assert_eq!(number(first.read()) & !3, 0);
+                drop(first);
+                None
+            });
+            let replace: Role<Option<u32>> = Box::new(move || {
+                let mut reader = readers.reader().ok()?;
+                let seen = number(reader.read());
+                // It stays for good.
+                std::mem::forget(reader);
+                Some(seen)
+            });
+            together(order, vec![write, leave, replace])[2]
+        },
+    );
 }
 
 /// A refused reader takes no place: whoever asks when there is room gets it. Room for one, three

@@ -135,3 +135,25 @@ impl<T: Copy> Guarded<T> {
         self.0.with_mut(|place| unsafe { *place = value });
     }
 }
+
+/// All models.
+pub(crate) fn all() -> impl Iterator<Item = Model> {
+    let lists = [
+        ring::ALL,
+        countdown::ALL,
+        arrivals::ALL,
+        inbox::ALL,
+        latest::ALL,
+        bell::ALL,
+        token::ALL,
+        pipeline::ALL,
+    ];
+    lists.into_iter().flatten().copied()
+}
+
+/// Runs the model called `name`.
+pub(crate) fn run(name: &str) {
+    let (_, model) =
+        all().find(|model| model.0 == name).unwrap_or_else(|| panic!("no model {name}"));
+    model();
+}
