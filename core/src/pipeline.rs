@@ -248,7 +248,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         unit: UnitId,
         out: &mut impl Outputs,
     ) -> Result<(), TableFull> {
-        let found = if self.tables.unit(unit).solitary {
+        let found = if self.tables.unit(unit).bypasses {
             Ok(())
         } else {
             match self.config.broad_phase {
@@ -415,7 +415,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         if frame.next() == self.window.limit {
             return;
         }
-        if self.tables.unit(unit).solitary {
+        if self.tables.unit(unit).bypasses {
             self.leave_gate(unit, out);
         } else {
             out.emit(Work::Enter(unit));

@@ -64,6 +64,7 @@ impl<'m, E: Environment> Tables<'m, E> {
             unit.inbox = crate::inbox::Inbox::new();
             // No rendering precedes the first update: it waits for the frame's opening only.
             unit.pending.arm(1);
+            unit.bypasses = unit.solitary;
         }
         if modelled {
             link_modelled(units, interactions)?;
@@ -112,7 +113,7 @@ fn link_modelled<O, I>(
         }
     }
     for unit in units {
-        unit.solitary = unit.modelled.load(site::EXCLUSIVE) == NONE;
+        unit.bypasses = unit.modelled.load(site::EXCLUSIVE) == NONE;
     }
     Ok(())
 }
