@@ -6,12 +6,13 @@ use dualframe_core::pipeline::BroadPhase;
 use dualframe_tests::{drive, random_ve};
 use proptest::prelude::*;
 
-/// 256 cases each unless `PROPTEST_CASES` says otherwise. What fails depends on the machine's
+/// 1,000 cases each unless `PROPTEST_CASES` says otherwise. What fails depends on the machine's
 /// interleaving as well as on the case, so a file of failed seeds would promise too much: the
 /// message shows the case itself.
 fn config() -> ProptestConfig {
     let default = ProptestConfig::default();
-    ProptestConfig { failure_persistence: None, max_shrink_iters: 64, ..default }
+    let cases = std::env::var("PROPTEST_CASES").map_or(1000, |_| default.cases);
+    ProptestConfig { cases, failure_persistence: None, max_shrink_iters: 64, ..default }
 }
 
 proptest! {
