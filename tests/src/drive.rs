@@ -166,7 +166,6 @@ fn run_pipeline<'c>(case: &'c Case, trace: &'c Trace) -> (Outcome, Vec<String>) 
         }
     }
     let bodies = pipeline.objects_mut().map(|body| *body).collect();
-    drop(pipeline);
     let states = interactions.iter_mut().map(|slot| *slot.state_mut());
     let memories = if case.edges.is_empty() { vec![] } else { states.collect() };
     let mut faults = vec![];
@@ -261,11 +260,12 @@ impl<'p, 'c> Shop<'p, 'c> {
                 }
             }
             let idle = step == Ok(Step::Idle);
-            if (idle || dice.one_in(6)) && worker.token().is_none() {
-                if let Some(token) = self.tokens.lock().expect("no poison").pop() {
-                    worker.hold(token).map_err(drop).expect("this pipeline's token");
-                    continue;
-                }
+            if (idle || dice.one_in(6))
+                && worker.token().is_none()
+                && let Some(token) = self.tokens.lock().expect("no poison").pop()
+            {
+                worker.hold(token).map_err(drop).expect("this pipeline's token");
+                continue;
             }
             if idle && self.case.sleep {
                 worker.wait();
