@@ -1,2 +1,67 @@
-//! core
-#![no_std]
+//! The dual-frame four-stage pipeline: broad phase, interaction, update, render, at most two
+//! consecutive frames in flight, and workers that migrate to wherever work lies.
+//!
+//! # Realtime contract
+//!
+//! After construction the core does not allocate, lock, call the system or print; all memory is the
+//! host's. One [`worker::Worker::step`] does at most one work unit: its own cost is a bounded
+//! number of atomic operations (`PROTOCOL.md` §8), except that a compare-and-swap is retried when
+//! another worker succeeded at the same word meanwhile. A worker that is suspended anywhere holds
+//! back only the work unit in its hand. A full table is a returned error that names the capacity
+//! needed. Waiting is the host's ([`wait::Waiting`]).
+//!
+//! # One idea
+//!
+//! The last arriver carries on: every synchronisation is a [`countdown::Countdown`], and whoever
+//! takes it to zero owns what comes next. `core/PROTOCOL.md` has the states, the memory orders and
+//! a proof sketch; the package `dualframe-verification` model-checks this very source.
+//!
+//! # From the paper to the modules
+//!
+//! | paper | module |
+//! |---|---|
+//! | §4.1 objects and interaction pairs, §5.2 callbacks | [`environment`], [`inputs`] |
+//! | §4.2 queues and carry-over | [`ring`], [`worker`] |
+//! | §5.1 four stages (Fig. 6) | [`stage`], [`pipeline`] |
+//! | §5.1, §5.3 render token | [`token`] |
+//! | §5.3 thread migration (Fig. 8) | [`migrate`], [`worker`] |
+//! | §5.4 synchronisation | [`countdown`], [`arrivals`] |
+//! | §5.5 consecutive frames | [`frame`] |
+//! | §5.6 temp buffers, preallocation | [`contacts`], [`storage`] |
+//! | §6.1 threads come and go | [`worker`], [`wait`] |
+//! | §6.2 messages | [`inbox`] |
+//! | §6.3 haptics | [`latest`] |
+//! | Table 1 | [`probe`] |
+#![cfg_attr(not(loom), no_std)]
+#![deny(clippy::unwrap_used, clippy::expect_used)]
+
+#[cfg(all(test, not(loom)))]
+extern crate std;
+
+/// The README's example, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;
+
+pub mod arrivals;
+pub mod contacts;
+pub mod countdown;
+pub mod environment;
+pub mod error;
+pub mod frame;
+pub mod inbox;
+pub mod inputs;
+pub mod latest;
+mod list;
+pub mod migrate;
+pub mod pipeline;
+pub mod probe;
+pub mod ring;
+pub mod stage;
+pub mod storage;
+pub mod sync;
+mod tables;
+pub mod token;
+pub mod unit;
+pub mod wait;
+pub mod worker;

@@ -7,6 +7,7 @@
 mod barrier;
 mod clock;
 mod mail;
+mod pipeline;
 mod rayon;
 mod rayon_overlapped;
 mod serial;
@@ -26,6 +27,7 @@ use crate::stages::PairCount;
 pub use self::rayon::RayonExecutor;
 pub use clock::{Stage, StageSeconds};
 pub use mail::{Letter, Mail};
+pub use pipeline::{Entry, PipelineExecutor};
 pub use rayon_overlapped::RayonOverlappedExecutor;
 pub use serial::SerialExecutor;
 pub use static_::StaticExecutor;
@@ -46,7 +48,21 @@ pub enum ExecutorKind {
     RayonOverlapped,
 }
 
-/// Why an executor cannot be built.
+impl ExecutorKind {
+    /// The name by which the program knows it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pipeline => "pipeline",
+            Self::Serial => "serial",
+            Self::Static => "static",
+            Self::Rayon => "rayon",
+            Self::RayonOverlapped => "rayon-overlapped",
+        }
+    }
+}
+
+/// Why an executor cannot be built, or cannot go on.
 #[derive(Debug, Error)]
 pub enum ExecutorError {
     /// The objects cannot be grouped.
@@ -61,6 +77,12 @@ pub enum ExecutorError {
     /// The system gave no thread.
     #[error("a worker thread could not be started")]
     Spawn(#[source] std::io::Error),
+    /// The pipeline cannot be built.
+    #[error(transparent)]
+    Setup(#[from] dualframe_core::error::SetupError),
+    /// One of the pipeline's tables is full.
+    #[error(transparent)]
+    Table(#[from] dualframe_core::error::TableFull),
     /// Rayon's pool could not be built.
     #[error("the thread pool could not be started")]
     Pool(#[from] ::rayon::ThreadPoolBuildError),
@@ -85,12 +107,16 @@ pub trait Executor {
     /// Advances by `frames` frames. Every frame's objects go to the renderer, then the frame is
     /// swapped and `on_frame` is told, in the order of the frames; when this returns, all of them are
     /// swapped. The renderer is called by the calling thread only.
+    ///
+    /// # Errors
+    /// One of the pipeline's tables is full. The environment cannot go on then: a frame without some
+    /// of its interactions would not be the same for every schedule.
     fn advance(
         &mut self,
         frames: u64,
         renderer: &mut dyn Renderer,
         on_frame: &mut dyn FnMut(&FrameRecord),
-    );
+    ) -> Result<(), ExecutorError>;
 
     /// The number of frames done so far, which is the number of the next one.
     fn frame(&self) -> u64;

@@ -44,7 +44,7 @@ impl Executor for RayonExecutor {
         frames: u64,
         renderer: &mut dyn Renderer,
         on_frame: &mut dyn FnMut(&FrameRecord),
-    ) {
+    ) -> Result<(), ExecutorError> {
         let began = Instant::now();
         for _ in 0..frames {
             let frame = self.engine.frame;
@@ -59,6 +59,7 @@ impl Executor for RayonExecutor {
             on_frame(&FrameRecord { frame, swapped: Instant::now(), pairs });
         }
         self.running += began.elapsed();
+        Ok(())
     }
 
     fn frame(&self) -> u64 {

@@ -60,7 +60,7 @@ impl Executor for RayonOverlappedExecutor {
         frames: u64,
         renderer: &mut dyn Renderer,
         on_frame: &mut dyn FnMut(&FrameRecord),
-    ) {
+    ) -> Result<(), ExecutorError> {
         let began = Instant::now();
         let (taken_in, taken_out) = sync_channel(PICTURES);
         let (engine, pool, unused) = (&mut self.engine, &self.pool, &mut self.unused);
@@ -78,6 +78,7 @@ impl Executor for RayonOverlappedExecutor {
         });
         self.engine.workers[0].clock.add(Stage::Render, render_time);
         self.running += began.elapsed();
+        Ok(())
     }
 
     fn frame(&self) -> u64 {

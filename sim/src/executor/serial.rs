@@ -112,7 +112,7 @@ impl Executor for SerialExecutor {
         frames: u64,
         renderer: &mut dyn Renderer,
         on_frame: &mut dyn FnMut(&FrameRecord),
-    ) {
+    ) -> Result<(), ExecutorError> {
         let began = Instant::now();
         for _ in 0..frames {
             if self.world.regroups_before(self.frame) {
@@ -127,6 +127,7 @@ impl Executor for SerialExecutor {
             self.frame += 1;
         }
         self.running += began.elapsed();
+        Ok(())
     }
 
     fn frame(&self) -> u64 {

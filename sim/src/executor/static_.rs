@@ -246,7 +246,7 @@ impl Executor for StaticExecutor {
         frames: u64,
         renderer: &mut dyn Renderer,
         on_frame: &mut dyn FnMut(&FrameRecord),
-    ) {
+    ) -> Result<(), ExecutorError> {
         let began = Instant::now();
         let mut scratch = Scratch::new();
         for _ in 0..frames {
@@ -259,6 +259,7 @@ impl Executor for StaticExecutor {
             self.frame += 1;
         }
         self.running += began.elapsed();
+        Ok(())
     }
 
     fn frame(&self) -> u64 {

@@ -1,0 +1,212 @@
+//! Results of interactions: the paper's temp buffers (§5.6), one pool for each frame in flight.
+//!
+//! Response never writes into an object. It pushes records; the updates of the two objects read
+//! them. A push claims room by one counter and is then contiguous; an interaction's pushes are
+//! chained. The pool of a frame is emptied when the next frame opens, when all its readers are
+//! done.
+
+use ::core::cell::UnsafeCell;
+use ::core::mem::MaybeUninit;
+
+use crossbeam_utils::CachePadded;
+
+use crate::error::{Table, TableFull};
+use crate::frame::Frame;
+use crate::sync::{Atomic, Cell, const_fn, site};
+use crate::unit::NONE;
+
+/// Memory of one result record. Contiguous and unwatched by loom: the segment that covers it is
+/// watched instead.
+#[derive(Debug)]
+#[repr(transparent)]
+pub struct ContactSlot<C>(UnsafeCell<MaybeUninit<C>>);
+
+// SAFETY: a slot is written by the one claimer of its range and read by others only after the
+// interaction was released to its ends' countdowns; see `Pool::push` and `Segments::next`.
+unsafe impl<C: Send + Sync> Sync for ContactSlot<C> {}
+
+impl<C> ContactSlot<C> {
+    /// An empty slot; it costs nothing to make.
+    pub const fn new() -> Self {
+        Self(UnsafeCell::new(MaybeUninit::uninit()))
+    }
+}
+
+impl<C> Default for ContactSlot<C> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Header {
+    length: u32,
+    /// The interaction's next segment.
+    next: u32,
+}
+
+/// Memory of the header that a segment starting at the contact slot of the same index would have.
+#[derive(Debug)]
+pub struct SegmentSlot(Cell<Header>);
+
+impl SegmentSlot {
+    const_fn! {
+        /// An unused header.
+        pub const fn new() -> Self {
+            Self(Cell::new(Header { length: 0, next: NONE }))
+        }
+    }
+}
+
+#[cfg(not(loom))]
+impl Default for SegmentSlot {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Claims `count` of a table's slots, or none: exactly, so that a refused claim costs no room and
+/// no number of refusals can make the counter wrap.
+#[inline]
+pub(crate) fn claim(
+    used: &Atomic,
+    count: u32,
+    capacity: u32,
+    table: Table,
+) -> Result<u32, TableFull> {
+    let mut start = used.load(site::POOL_CLAIM);
+    loop {
+        let needed = start as usize + count as usize;
+        if needed > capacity as usize {
+            return Err(TableFull { table, capacity: capacity as usize, needed });
+        }
+        match used.exchange(start, start + count, site::POOL_CLAIM) {
+            Ok(_) => return Ok(start),
+            Err(found) => start = found,
+        }
+    }
+}
+
+/// The two frames' pools: even frames have the first half of the slots, odd ones the second.
+#[derive(Debug)]
+pub(crate) struct Pools<'m, C> {
+    contacts: &'m [ContactSlot<C>],
+    segments: &'m [SegmentSlot],
+    used: [CachePadded<Atomic>; 2],
+    /// Slots of one frame.
+    half: u32,
+}
+
+impl<'m, C: Copy> Pools<'m, C> {
+    pub(crate) fn new(contacts: &'m [ContactSlot<C>], segments: &'m [SegmentSlot]) -> Self {
+        let used = [0, 1].map(|_| CachePadded::new(Atomic::new(0)));
+        Self { contacts, segments, used, half: (contacts.len() / 2) as u32 }
+    }
+
+    /// Empties `frame`'s pool.
+    pub(crate) fn reset(&self, frame: Frame) {
+        self.used[frame.parity()].store(0, site::POOL_RESET);
+    }
+
+    /// Slots that `frame` has claimed so far.
+    pub(crate) fn used(&self, frame: Frame) -> u32 {
+        self.used[frame.parity()].load(site::POOL_CLAIM)
+    }
+
+    /// Writes `records` and returns the index of their segment.
+    fn push(&self, frame: Frame, records: &[C]) -> Result<u32, TableFull> {
+        // A longer slice cannot fit either, and is named by the length that does not.
+        let length = u32::try_from(records.len()).unwrap_or(u32::MAX);
+        let claimed = claim(&self.used[frame.parity()], length, self.half, Table::Contacts)?;
+        let start = claimed + frame.parity() as u32 * self.half;
+        let room = &self.contacts[start as usize..start as usize + records.len()];
+        // SAFETY: `claim` gave this range to this call alone, until `reset`, which happens after
+        // the last reader; the slots are contiguous and `transparent`.
+        unsafe {
+            let first = UnsafeCell::raw_get(room.as_ptr().cast::<UnsafeCell<MaybeUninit<C>>>());
+            ::core::ptr::copy_nonoverlapping(records.as_ptr(), first.cast::<C>(), records.len());
+        }
+        // SAFETY: the header belongs to the range just claimed.
+        unsafe {
+            self.segments[start as usize]
+                .0
+                .with_mut(|header| *header = Header { length, next: NONE });
+        }
+        Ok(start)
+    }
+
+    /// The records of the interaction whose first segment is `first`.
+    ///
+    /// # Safety
+    /// The interaction is done and this frame's pool has not been reset, for as long as the
+    /// iterator and what it yields live.
+    pub(crate) unsafe fn segments<'a>(&'a self, first: u32) -> Segments<'a, 'm, C> {
+        Segments { pools: self, next: first }
+    }
+}
+
+/// Where an interaction's response puts its results.
+#[derive(Debug)]
+pub struct Contacts<'a, 'm, C> {
+    pools: &'a Pools<'m, C>,
+    frame: Frame,
+    first: u32,
+    last: u32,
+}
+
+impl<'a, 'm, C: Copy> Contacts<'a, 'm, C> {
+    pub(crate) fn new(pools: &'a Pools<'m, C>, frame: Frame) -> Self {
+        Self { pools, frame, first: NONE, last: NONE }
+    }
+
+    pub(crate) fn first(&self) -> u32 {
+        self.first
+    }
+
+    /// Appends `records` as one segment, which the updates read as one slice.
+    ///
+    /// # Errors
+    /// [`TableFull`] if the frame's pool has no room; nothing is written then.
+    #[inline]
+    pub fn push(&mut self, records: &[C]) -> Result<(), TableFull> {
+        if records.is_empty() {
+            return Ok(());
+        }
+        let segment = self.pools.push(self.frame, records)?;
+        if self.last == NONE {
+            self.first = segment;
+        } else {
+            let last = &self.pools.segments[self.last as usize].0;
+            // SAFETY: `last` was claimed by this interaction, whose results nobody reads yet.
+            unsafe { last.with_mut(|header| header.next = segment) };
+        }
+        self.last = segment;
+        Ok(())
+    }
+}
+
+/// An interaction's results: a slice for each push, in the order of the pushes.
+#[derive(Debug)]
+pub struct Segments<'a, 'm, C> {
+    pools: &'a Pools<'m, C>,
+    next: u32,
+}
+
+impl<'a, C> Iterator for Segments<'a, '_, C> {
+    type Item = &'a [C];
+
+    #[inline]
+    fn next(&mut self) -> Option<&'a [C]> {
+        if self.next == NONE {
+            return None;
+        }
+        let start = self.next as usize;
+        // SAFETY: the interaction is done (`Pools::segments`), so nobody writes its headers.
+        let header = unsafe { self.pools.segments[start].0.with(|header| *header) };
+        self.next = header.next;
+        let room = &self.pools.contacts[start..start + header.length as usize];
+        // SAFETY: `push` initialised the range before it wrote the header; it is not written
+        // again while this frame's results are read.
+        Some(unsafe { ::core::slice::from_raw_parts(room.as_ptr().cast::<C>(), room.len()) })
+    }
+}

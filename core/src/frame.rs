@@ -1,0 +1,103 @@
+//! Frame tags and the window of two frames in flight (§5.5).
+
+use crossbeam_utils::CachePadded;
+
+use crate::countdown::Countdown;
+use crate::sync::{Atomic, site};
+
+/// A frame's number. It wraps after 2^32 frames; only equality, parity and the distance of
+/// neighbouring frames are ever used, so that wrapping is harmless.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Frame(pub u32);
+
+impl Frame {
+    /// The frame after this one.
+    #[inline]
+    pub fn next(self) -> Self {
+        Self(self.0.wrapping_add(1))
+    }
+
+    /// The frame before this one.
+    #[inline]
+    pub fn previous(self) -> Self {
+        Self(self.0.wrapping_sub(1))
+    }
+
+    /// Which of the two frames in flight this is: 0 or 1.
+    #[inline]
+    pub fn parity(self) -> usize {
+        (self.0 & 1) as usize
+    }
+
+    /// Whether this frame comes before `other`, at a distance below 2^31.
+    #[inline]
+    pub fn is_before(self, other: Self) -> bool {
+        self != other && other.0.wrapping_sub(self.0) < 1 << 31
+    }
+}
+
+/// When a unit enters its next frame: how far two consecutive frames overlap.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Entry {
+    /// As soon as it is updated: its rendering overlaps with the next frame's detection, since
+    /// both only read it. Two frames in flight.
+    #[default]
+    AfterUpdate,
+    /// When it is rendered, as in the paper (Fig. 6). Two frames in flight.
+    AfterRender,
+    /// When its whole frame is swapped. One frame in flight.
+    AfterSwap,
+}
+
+/// The frame-wide countdowns, and how far frames have come.
+#[derive(Debug)]
+pub(crate) struct Window {
+    /// Units that have not entered the frame being gathered. Its last arriver opens the frame:
+    /// updates of it may start, and no update of the frame before is left.
+    pub(crate) gate: CachePadded<Countdown>,
+    /// Units not yet rendered in the frame on display.
+    pub(crate) renders: CachePadded<Countdown>,
+    /// The frame being rendered: every frame before it is swapped.
+    display: CachePadded<Atomic>,
+    /// The last frame that was opened, for the stamps of letters from outside.
+    open: CachePadded<Atomic>,
+    /// The first frame that is not to be entered. Written only by `&mut` access.
+    pub(crate) limit: Frame,
+    units: u32,
+}
+
+impl Window {
+    pub(crate) fn new(units: u32) -> Self {
+        Self {
+            gate: CachePadded::new(Countdown::new(units)),
+            renders: CachePadded::new(Countdown::new(units)),
+            display: CachePadded::new(Atomic::new(0)),
+            open: CachePadded::new(Atomic::new(u32::MAX)),
+            limit: Frame(0),
+            units,
+        }
+    }
+
+    /// The frame that may be rendered now.
+    #[inline]
+    pub(crate) fn display(&self) -> Frame {
+        Frame(self.display.load(site::DISPLAY_LOAD))
+    }
+
+    /// After the swap of `frame`: renderers turn to the next one.
+    pub(crate) fn swapped(&self, frame: Frame) {
+        self.renders.arm(self.units);
+        self.display.store(frame.next().0, site::DISPLAY_ADVANCE);
+    }
+
+    /// `frame` has been gathered; the gate now gathers the next one.
+    pub(crate) fn opened(&self, frame: Frame) {
+        self.gate.arm(self.units);
+        self.open.store(frame.0, site::FRAME_OPEN_SET);
+    }
+
+    /// The last frame opened.
+    pub(crate) fn open(&self) -> Frame {
+        Frame(self.open.load(site::FRAME_OPEN_LOOK))
+    }
+}

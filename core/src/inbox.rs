@@ -1,0 +1,212 @@
+//! Inboxes (§6.2): bounded, many senders, read by the receiving unit's update.
+//!
+//! What is posted in frame f is processed in frame f + 1's update, ordered by (sender, sequence),
+//! whoever posted first. All inboxes draw letters from one pool: a free slot is popped from a
+//! ring, filled, and pushed onto the receiver's list; the receiver takes the whole list at once.
+
+use crate::error::{Table, TableFull};
+use crate::frame::Frame;
+use crate::list;
+use crate::ring::{IndexRing, QueueSlot};
+use crate::sync::{Atomic, Cell, const_fn, site};
+use crate::unit::NONE;
+
+/// Memory of one letter.
+#[derive(Debug)]
+pub struct LetterSlot<M> {
+    message: Cell<Option<M>>,
+    next: Atomic,
+    /// The frame in which it was posted.
+    stamp: Atomic,
+    sender: Atomic,
+    sequence: Atomic,
+}
+
+impl<M> LetterSlot<M> {
+    const_fn! {
+        /// An empty letter.
+        pub const fn new() -> Self {
+            Self {
+                message: Cell::new(None),
+                next: Atomic::new(NONE),
+                stamp: Atomic::new(0),
+                sender: Atomic::new(0),
+                sequence: Atomic::new(0),
+            }
+        }
+    }
+
+    fn rank(&self) -> (u32, u32) {
+        (self.sender.load(site::SLOT_FIELD), self.sequence.load(site::SLOT_FIELD))
+    }
+}
+
+#[cfg(not(loom))]
+impl<M> Default for LetterSlot<M> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Whose letter it is, and which of theirs: the order in which a receiver processes letters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct From {
+    /// The sender's number, chosen by the host.
+    pub sender: u32,
+    /// Counts the sender's letters of a frame.
+    pub sequence: u32,
+}
+
+/// A letter that did not fit, with the message back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rejected<M> {
+    /// What was to be posted.
+    pub message: M,
+    /// Why it was not.
+    pub full: TableFull,
+}
+
+/// One unit's inbox: the newest letter, each leading to the one before.
+#[derive(Debug)]
+pub struct Inbox(Atomic);
+
+impl Inbox {
+    const_fn! {
+        /// An empty inbox.
+        pub const fn new() -> Self {
+            Self(Atomic::new(NONE))
+        }
+    }
+}
+
+#[cfg(not(loom))]
+impl Default for Inbox {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The pool of letters that a pipeline's inboxes share.
+#[derive(Debug)]
+pub struct Post<'m, M> {
+    slots: &'m [LetterSlot<M>],
+    free: IndexRing<'m>,
+}
+
+impl<'m, M: Send + Sync> Post<'m, M> {
+    /// A pool of as many letters as there are `slots`; `queue` holds the free ones and must have
+    /// [`crate::ring::slots_for`] of them.
+    ///
+    /// # Panics
+    /// If `queue` is too short.
+    pub fn new(slots: &'m mut [LetterSlot<M>], queue: &'m mut [QueueSlot]) -> Self {
+        let free = IndexRing::new(queue);
+        for (index, slot) in slots.iter_mut().enumerate() {
+            *slot.message.get_mut() = None;
+            free.push(index as u32);
+        }
+        Self { slots, free }
+    }
+
+    /// Posts `message` to `inbox` in frame `stamp`.
+    ///
+    /// # Errors
+    /// [`Rejected`] with the message if all letters are under way.
+    pub fn post(
+        &self,
+        inbox: &Inbox,
+        stamp: Frame,
+        from: From,
+        message: M,
+    ) -> Result<(), Rejected<M>> {
+        let Some(index) = self.free.pop() else {
+            let capacity = self.slots.len();
+            let full = TableFull { table: Table::Letters, capacity, needed: capacity + 1 };
+            return Err(Rejected { message, full });
+        };
+        let slot = &self.slots[index as usize];
+        // SAFETY: the index came from the free ring, so the slot is this caller's alone until
+        // `put` publishes it.
+        unsafe { slot.message.with_mut(|place| *place = Some(message)) };
+        slot.stamp.store(stamp.0, site::SLOT_FIELD);
+        slot.sender.store(from.sender, site::SLOT_FIELD);
+        slot.sequence.store(from.sequence, site::SLOT_FIELD);
+        self.put(inbox, index);
+        Ok(())
+    }
+
+    fn put(&self, inbox: &Inbox, index: u32) {
+        let next = &self.slots[index as usize].next;
+        let mut newest = inbox.0.load(site::LIST_FOLLOW);
+        loop {
+            next.store(newest, site::LIST_LINK);
+            match inbox.0.exchange(newest, index, site::MAIL_PUSH) {
+                Ok(_) => return,
+                Err(found) => newest = found,
+            }
+        }
+    }
+
+    /// The letters to process in `frame`: those posted before it, in order. One reader an inbox.
+    pub fn collect(&self, inbox: &Inbox, frame: Frame) -> Mail<'_, 'm, M> {
+        // An empty inbox stays untouched: most are, in most frames.
+        if inbox.0.load(site::LIST_FOLLOW) == NONE {
+            return Mail { post: self, next: NONE };
+        }
+        let mut rest = inbox.0.swap(NONE, site::MAIL_TAKE);
+        let mut due = NONE;
+        while rest != NONE {
+            let slot = &self.slots[rest as usize];
+            let index = rest;
+            rest = slot.next.load(site::LIST_FOLLOW);
+            if Frame(slot.stamp.load(site::SLOT_FIELD)).is_before(frame) {
+                slot.next.store(due, site::LIST_LINK);
+                due = index;
+            } else {
+                self.put(inbox, index);
+            }
+        }
+        let slot = |index: u32| &self.slots[index as usize];
+        let next = list::sort(
+            due,
+            |index| slot(index).next.load(site::LIST_FOLLOW),
+            |index, to| slot(index).next.store(to, site::LIST_LINK),
+            |a, b| slot(a).rank() < slot(b).rank(),
+        );
+        Mail { post: self, next }
+    }
+}
+
+/// Letters in the order of (sender, sequence). Those that are not taken are dropped with it.
+#[derive(Debug)]
+pub struct Mail<'p, 'm, M: Send + Sync> {
+    post: &'p Post<'m, M>,
+    next: u32,
+}
+
+impl<M: Send + Sync> Iterator for Mail<'_, '_, M> {
+    type Item = (From, M);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        while self.next != NONE {
+            let index = self.next;
+            let slot = &self.post.slots[index as usize];
+            let (sender, sequence) = slot.rank();
+            self.next = slot.next.load(site::LIST_FOLLOW);
+            // SAFETY: `collect` took the letter out of the inbox, so this reader has it alone
+            // until the push below gives the slot back.
+            let message = unsafe { slot.message.with_mut(Option::take) };
+            self.post.free.push(index);
+            if let Some(message) = message {
+                return Some((From { sender, sequence }, message));
+            }
+        }
+        None
+    }
+}
+
+impl<M: Send + Sync> Drop for Mail<'_, '_, M> {
+    fn drop(&mut self) {
+        self.for_each(drop);
+    }
+}

@@ -1,0 +1,95 @@
+//! What an update reads: the unit's letters and its interactions' results, in fixed orders.
+
+use crate::contacts::Segments;
+use crate::environment::Environment;
+use crate::frame::Frame;
+use crate::inbox::{From, Mail, Rejected};
+use crate::storage::Chain;
+use crate::tables::Tables;
+use crate::unit::{InteractionId, NONE, UnitId};
+
+/// One unit's inputs to one update.
+pub struct Inputs<'t, 'm, E: Environment + ?Sized> {
+    tables: &'t Tables<'m, E>,
+    unit: UnitId,
+    frame: Frame,
+    /// First of the unit's candidates, sorted by pair.
+    candidates: u32,
+    mail: Mail<'t, 'm, E::Message>,
+    /// Letters posted so far by this update.
+    posted: u32,
+}
+
+/// An interaction that the unit took part in this frame.
+#[derive(Debug)]
+pub struct Interacted<'t, 'm, I, C> {
+    /// The interaction's slot.
+    pub id: InteractionId,
+    /// The unit at the other end; the same unit for an interaction within it.
+    pub other: UnitId,
+    /// The interaction's state.
+    pub state: &'t I,
+    /// Its result records, a slice for each push.
+    pub contacts: Segments<'t, 'm, C>,
+}
+
+impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
+    pub(crate) fn new(tables: &'t Tables<'m, E>, unit: UnitId, frame: Frame) -> Self {
+        let candidates = tables.sort_candidates(unit);
+        let mail = tables.post.collect(&tables.unit(unit).inbox, frame);
+        Self { tables, unit, frame, candidates, mail, posted: 0 }
+    }
+
+    /// The unit's interactions of this frame that passed the broad phase, in pair order: by the
+    /// other unit's number, and by slot where two units have several.
+    pub fn interactions(
+        &self,
+    ) -> impl Iterator<Item = Interacted<'t, 'm, E::Interaction, E::Contact>> + use<'t, 'm, E> {
+        let (tables, unit) = (self.tables, self.unit);
+        let mut next = self.candidates;
+        ::core::iter::from_fn(move || {
+            if next == NONE {
+                return None;
+            }
+            let id = InteractionId(next);
+            let slot = tables.interaction(id);
+            next = slot.next(Chain::Candidates, unit);
+            let first = slot.contacts.load(crate::sync::site::SLOT_FIELD);
+            Some(Interacted {
+                id,
+                other: slot.other(unit),
+                // SAFETY: the interaction ended before this update began, and its slot is not
+                // used again before this update, which outlives 't's use, has ended.
+                state: unsafe { slot.state.with(|state| &*::core::ptr::from_ref(state)) },
+                // SAFETY: as above; the frame's pool is reset when the next frame opens, for
+                // which this update must have ended.
+                contacts: unsafe { tables.pools.segments(first) },
+            })
+        })
+    }
+
+    /// The next letter posted to this unit before this frame, by (sender, sequence).
+    pub fn next_letter(&mut self) -> Option<(From, E::Message)> {
+        self.mail.next()
+    }
+
+    /// Posts a letter to `to`, who processes it in the next frame's update. Letters of one update
+    /// keep their order.
+    ///
+    /// # Errors
+    /// [`Rejected`] with the message if all letters are under way.
+    ///
+    /// # Panics
+    /// If there is no unit `to`.
+    pub fn post(
+        &mut self,
+        to: UnitId,
+        sender: u32,
+        message: E::Message,
+    ) -> Result<(), Rejected<E::Message>> {
+        let from = From { sender, sequence: self.posted };
+        self.tables.post.post(&self.tables.unit(to).inbox, self.frame, from, message)?;
+        self.posted += 1;
+        Ok(())
+    }
+}

@@ -1,0 +1,154 @@
+//! A latest-value cell: one writer, many readers, neither ever waits for the other.
+//!
+//! After M. Ianni, A. Pellegrini, F. Quaglia, "A Wait-free Multi-word Atomic (1,N) Register"
+//! (2017): one word holds the newest slot and how many readers have entered it, so that a reader
+//! finds the slot and marks itself inside by one `fetch_add`, and the writer, publishing by one
+//! `swap`, learns how many it must see leave before it may use the old slot again. Haptics use it
+//! (§6.3): the device loop reads force and gradient at its own rate, the pipeline at its own.
+
+use crate::error::{Table, TableFull};
+use crate::sync::{Atomic, Cell, site};
+
+const INDEX_BITS: u32 = 8;
+const INDEX: u32 = (1 << INDEX_BITS) - 1;
+/// Entries are counted modulo 2^24; far fewer readers exist at once.
+const ENTRIES: u32 = u32::MAX >> INDEX_BITS;
+
+#[derive(Debug)]
+struct Slot<T> {
+    value: Cell<T>,
+    /// Readers that had entered when the slot was retired. The writer's own note.
+    entered: Atomic,
+    /// Readers that have left since it was published.
+    left: Atomic,
+}
+
+/// The cell, with `SLOTS - 2` readers at most; `SLOTS` is 3 to 256.
+#[derive(Debug)]
+pub struct Latest<T, const SLOTS: usize> {
+    slots: [Slot<T>; SLOTS],
+    /// Readers that have entered the newest slot, and its index in the low 8 bits.
+    newest: Atomic,
+    readers: Atomic,
+}
+
+impl<T: Copy + Send + Sync, const SLOTS: usize> Latest<T, SLOTS> {
+    const SLOTS_FIT: () = assert!(SLOTS >= 3 && SLOTS <= 256, "3 to 256 slots");
+
+    /// A cell that holds `value` until the first publication.
+    pub fn new(value: T) -> Self {
+        let () = Self::SLOTS_FIT;
+        let slot =
+            |_| Slot { value: Cell::new(value), entered: Atomic::new(0), left: Atomic::new(0) };
+        Self {
+            slots: ::core::array::from_fn(slot),
+            newest: Atomic::new(0),
+            readers: Atomic::new(0),
+        }
+    }
+
+    /// The one writer, and the handle that makes readers.
+    pub fn split(&mut self) -> (Writer<'_, T, SLOTS>, Readers<'_, T, SLOTS>) {
+        let newest = self.newest.load(site::EXCLUSIVE) & INDEX;
+        (Writer { cell: self, newest }, Readers { cell: self })
+    }
+
+    fn enter(&self) -> u32 {
+        self.newest.fetch_add(1 << INDEX_BITS, site::LATEST_ENTER) & INDEX
+    }
+
+    fn leave(&self, slot: u32) {
+        self.slots[slot as usize].left.fetch_add(1, site::LATEST_LEAVE);
+    }
+}
+
+/// Publishes values. There is one: it borrows the cell exclusively through `split`.
+#[derive(Debug)]
+pub struct Writer<'c, T, const SLOTS: usize> {
+    cell: &'c Latest<T, SLOTS>,
+    newest: u32,
+}
+
+impl<T: Copy + Send + Sync, const SLOTS: usize> Writer<'_, T, SLOTS> {
+    /// Makes `value` the newest. Wait-free: at most `SLOTS` slots are looked at.
+    pub fn publish(&mut self, value: T) {
+        let free = self.free_slot();
+        let slot = &self.cell.slots[free as usize];
+        // SAFETY: every reader that entered this slot has left it (`free_slot`), and none can
+        // enter before the swap below publishes it.
+        unsafe { slot.value.with_mut(|place| *place = value) };
+        slot.left.store(0, site::SLOT_FIELD);
+        let old = self.cell.newest.swap(free, site::LATEST_PUBLISH);
+        let retired = &self.cell.slots[(old & INDEX) as usize];
+        retired.entered.store(old >> INDEX_BITS, site::SLOT_FIELD);
+        self.newest = free;
+    }
+
+    /// A slot that nobody is inside. There is one: each reader is inside one slot at most, one is
+    /// the newest, and there are two slots more than readers.
+    fn free_slot(&self) -> u32 {
+        let vacant = |&index: &u32| {
+            let slot = &self.cell.slots[index as usize];
+            let left = slot.left.load(site::LATEST_REUSE) & ENTRIES;
+            index != self.newest && slot.entered.load(site::SLOT_FIELD) == left
+        };
+        (0..SLOTS as u32).find(vacant).unwrap_or_else(|| unreachable!("readers are limited"))
+    }
+}
+
+/// Makes readers; may be shared.
+#[derive(Debug)]
+pub struct Readers<'c, T, const SLOTS: usize> {
+    cell: &'c Latest<T, SLOTS>,
+}
+
+impl<T, const SLOTS: usize> Clone for Readers<'_, T, SLOTS> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T, const SLOTS: usize> Copy for Readers<'_, T, SLOTS> {}
+
+impl<'c, T: Copy + Send + Sync, const SLOTS: usize> Readers<'c, T, SLOTS> {
+    /// One more reader.
+    ///
+    /// # Errors
+    /// [`TableFull`] if `SLOTS - 2` readers exist.
+    pub fn reader(&self) -> Result<Reader<'c, T, SLOTS>, TableFull> {
+        let capacity = SLOTS - 2;
+        let before = self.cell.readers.fetch_add(1, site::TOKEN_COUNT) as usize;
+        if before >= capacity {
+            self.cell.readers.fetch_sub(1, site::TOKEN_COUNT);
+            return Err(TableFull { table: Table::Readers, capacity, needed: before + 1 });
+        }
+        Ok(Reader { cell: self.cell, inside: self.cell.enter() })
+    }
+}
+
+/// Reads the newest value. It stays inside the slot that it read last, so that reading an
+/// unchanged cell is one load.
+#[derive(Debug)]
+pub struct Reader<'c, T: Copy + Send + Sync, const SLOTS: usize> {
+    cell: &'c Latest<T, SLOTS>,
+    inside: u32,
+}
+
+impl<T: Copy + Send + Sync, const SLOTS: usize> Reader<'_, T, SLOTS> {
+    /// The newest value. Wait-free: no loop.
+    pub fn read(&mut self) -> T {
+        if self.cell.newest.load(site::LATEST_LOOK) & INDEX != self.inside {
+            self.cell.leave(self.inside);
+            self.inside = self.cell.enter();
+        }
+        // SAFETY: this reader is inside the slot, so the writer does not touch it.
+        unsafe { self.cell.slots[self.inside as usize].value.with(|value| *value) }
+    }
+}
+
+impl<T: Copy + Send + Sync, const SLOTS: usize> Drop for Reader<'_, T, SLOTS> {
+    fn drop(&mut self) {
+        self.cell.leave(self.inside);
+        self.cell.readers.fetch_sub(1, site::TOKEN_COUNT);
+    }
+}

@@ -1,0 +1,155 @@
+//! A lock-free queue of indices, many producers and many consumers.
+//!
+//! A cell is one word, (cycle, index). Push CASes the cell from the last lap's cycle to this
+//! lap's, then anyone may help the tail on; pop loads the cell, then CASes the head. No state is
+//! half written, so a thread that is suspended anywhere inside stops nobody (invariant 7). The
+//! idea is iceoryx's `MpmcIndexQueue`; tickets that are filled later would block whoever waits.
+//!
+//! Every index is in at most one place at a time, so a ring with a slot for every index is never
+//! full, and push cannot fail.
+
+use crossbeam_utils::CachePadded;
+
+use crate::sync::{AtomicWord, const_fn, site, spin_hint};
+
+/// Memory of one ring slot.
+#[derive(Debug)]
+pub struct QueueSlot(AtomicWord);
+
+impl QueueSlot {
+    const_fn! {
+        /// An unused slot.
+        pub const fn new() -> Self {
+            Self(AtomicWord::new(0))
+        }
+    }
+}
+
+#[cfg(not(loom))]
+impl Default for QueueSlot {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Slots that a ring needs for `indices` different indices: the next power of two.
+pub const fn slots_for(indices: usize) -> usize {
+    if indices == 0 { 1 } else { indices.next_power_of_two() }
+}
+
+/// The queue. It borrows its slots, so the algorithm stands apart from the storage.
+///
+/// On a 64-bit target the cycle wraps after 2^64 / slots pushes; on a 32-bit one after
+/// 2^32 / slots laps of the ring, so keep rings there below about 2^12 slots: then a thread
+/// would have to sleep through a million laps, to the lap, to be mistaken.
+#[derive(Debug)]
+pub struct IndexRing<'m> {
+    cells: &'m [QueueSlot],
+    /// Next position to pop. A position counts up for ever; its low bits are the slot, its high
+    /// bits the cycle.
+    head: CachePadded<AtomicWord>,
+    /// Next position to push; may lag by one push that has not been helped on yet.
+    tail: CachePadded<AtomicWord>,
+    slot_bits: u32,
+}
+
+impl<'m> IndexRing<'m> {
+    /// An empty ring over the largest power of two of `slots`.
+    ///
+    /// # Panics
+    /// If `slots` is empty.
+    pub fn new(slots: &'m mut [QueueSlot]) -> Self {
+        assert!(!slots.is_empty(), "a ring needs at least one slot");
+        let slot_bits = slots.len().ilog2();
+        let cells = &slots[..1 << slot_bits];
+        // Laps are counted from 1: a cell of lap 0 is free for lap 1.
+        cells.iter().for_each(|cell| cell.0.store(0, site::EXCLUSIVE));
+        let first = 1 << slot_bits;
+        Self {
+            cells,
+            head: CachePadded::new(AtomicWord::new(first)),
+            tail: CachePadded::new(AtomicWord::new(first)),
+            slot_bits,
+        }
+    }
+
+    fn slot(&self, position: usize) -> &AtomicWord {
+        &self.cells[position & (self.cells.len() - 1)].0
+    }
+
+    /// The cycle of a position, or of a cell's word: both keep it above `slot_bits`.
+    fn cycle(&self, word: usize) -> usize {
+        word >> self.slot_bits
+    }
+
+    /// How many laps `word` is ahead of `position`, modulo the width of a cycle.
+    fn laps_ahead(&self, word: usize, position: usize) -> usize {
+        self.cycle(word).wrapping_sub(self.cycle(position)) & (usize::MAX >> self.slot_bits)
+    }
+
+    /// Appends `index`, which must not be in the ring.
+    ///
+    /// # Panics
+    /// If `index` is not below the number of slots: a host's error, caught before it can be
+    /// mistaken for another index.
+    #[inline]
+    pub fn push(&self, index: u32) {
+        let index = index as usize;
+        assert!(index < self.cells.len(), "index beyond the ring");
+        loop {
+            let tail = self.tail.load(site::RING_TAIL_LOAD);
+            let cell = self.slot(tail);
+            let seen = cell.load(site::RING_CELL_LOOK);
+            match self.laps_ahead(tail, seen) {
+                // Last lap's cell: free. Publishing is this one CAS.
+                1 => {
+                    let word = (self.cycle(tail) << self.slot_bits) | index;
+                    if cell.exchange(seen, word, site::RING_CELL_PUBLISH).is_ok() {
+                        self.help_tail(tail);
+                        return;
+                    }
+                }
+                // This lap's already: its pusher has not moved the tail yet.
+                0 => self.help_tail(tail),
+                // The tail that was loaded is old.
+                _ => {}
+            }
+            spin_hint();
+        }
+    }
+
+    fn help_tail(&self, tail: usize) {
+        // Failure means that somebody else helped; either way the tail has moved on.
+        let _ = self.tail.exchange(tail, tail.wrapping_add(1), site::RING_TAIL_HELP);
+    }
+
+    /// Takes the oldest index; `None` when the ring was empty at some moment of the call.
+    #[inline]
+    pub fn pop(&self) -> Option<u32> {
+        loop {
+            let head = self.head.load(site::RING_HEAD_LOAD);
+            let word = self.slot(head).load(site::RING_CELL_TAKE);
+            match self.laps_ahead(head, word) {
+                0 => {
+                    let next = head.wrapping_add(1);
+                    if self.head.exchange(head, next, site::RING_HEAD_CLAIM).is_ok() {
+                        return Some((word & (self.cells.len() - 1)) as u32);
+                    }
+                }
+                // Still last lap's: empty, unless the head that was loaded is old.
+                1 if self.head.load(site::RING_HEAD_LOAD) == head => return None,
+                _ => {}
+            }
+            spin_hint();
+        }
+    }
+
+    /// Whether the ring looks empty: a hint, stale as soon as it is given. It never takes a
+    /// push for absent that happened before.
+    #[inline]
+    pub fn looks_empty(&self) -> bool {
+        let head = self.head.load(site::RING_HEAD_LOAD);
+        let word = self.slot(head).load(site::RING_CELL_LOOK);
+        self.laps_ahead(head, word) == 1
+    }
+}

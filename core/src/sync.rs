@@ -1,0 +1,303 @@
+//! The only file that names atomics, fences and cells: `core`'s, `portable-atomic`'s, or loom's.
+//!
+//! Every atomic access elsewhere passes a [`Site`]: a name and the memory order that
+//! `core/PROTOCOL.md` gives it a reason for. An access without a site does not compile, and
+//! `verification` can weaken one site at a time, by name, to show that a model notices.
+
+use ::core::sync::atomic::Ordering;
+
+#[cfg(all(not(loom), not(feature = "portable-atomic")))]
+use ::core::sync::atomic as imp;
+#[cfg(loom)]
+use loom::sync::atomic as imp;
+#[cfg(all(not(loom), feature = "portable-atomic"))]
+use portable_atomic as imp;
+
+/// Makes a constructor `const`, except under loom, whose atomics register themselves at run time.
+macro_rules! const_fn {
+    ($(#[$meta:meta])* $vis:vis const fn $($rest:tt)*) => {
+        #[cfg(not(loom))]
+        $(#[$meta])* $vis const fn $($rest)*
+        #[cfg(loom)]
+        $(#[$meta])* $vis fn $($rest)*
+    };
+}
+pub(crate) use const_fn;
+
+/// A named atomic access and its memory order.
+#[derive(Clone, Copy, Debug)]
+pub struct Site {
+    /// Name used by PROTOCOL.md and by the ordering mutants.
+    pub name: &'static str,
+    /// The order this access is made with.
+    pub order: Ordering,
+}
+
+#[cfg(not(loom))]
+impl Site {
+    #[inline(always)]
+    fn effective(self) -> Ordering {
+        self.order
+    }
+}
+
+/// Which site is weakened, and to what (models only).
+#[cfg(loom)]
+pub mod mutant {
+    use super::{Ordering, Site};
+    use std::sync::RwLock;
+
+    static WEAKENED: RwLock<Option<(&'static str, Ordering)>> = RwLock::new(None);
+
+    /// Runs everything from now on with `site` at `order`; `None` restores the code as shipped.
+    pub fn weaken(mutant: Option<(Site, Ordering)>) {
+        let mut weakened = WEAKENED.write().unwrap_or_else(std::sync::PoisonError::into_inner);
+        *weakened = mutant.map(|(site, order)| (site.name, order));
+    }
+
+    impl Site {
+        pub(super) fn effective(self) -> Ordering {
+            match *WEAKENED.read().unwrap_or_else(std::sync::PoisonError::into_inner) {
+                Some((name, order)) if name == self.name => order,
+                _ => self.order,
+            }
+        }
+    }
+}
+
+macro_rules! sites {
+    ($($(#[$doc:meta])* $name:ident = $order:ident;)*) => {
+        /// Every atomic access of the core, by name.
+        pub mod site {
+            use super::{Ordering, Site};
+            $($(#[$doc])* pub const $name: Site =
+                Site { name: stringify!($name), order: Ordering::$order };)*
+            /// All sites, for the runner of ordering mutants.
+            pub const ALL: &[Site] = &[$($name),*];
+        }
+    };
+}
+
+sites! {
+    /// Relaxed: the construction and every `&mut` path; exclusive access orders it.
+    EXCLUSIVE = Relaxed;
+    /// Relaxed: a hint that is re-validated by the CAS on the cell.
+    RING_TAIL_LOAD = Relaxed;
+    /// Relaxed: re-validated by the CAS that follows.
+    RING_CELL_LOOK = Relaxed;
+    /// Release: publishes what the pusher wrote about the index to whoever pops it.
+    RING_CELL_PUBLISH = Release;
+    /// Relaxed: anyone may help the tail on; it carries no data.
+    RING_TAIL_HELP = Relaxed;
+    /// Relaxed: a hint that is re-validated by the CAS on the head.
+    RING_HEAD_LOAD = Relaxed;
+    /// Acquire: pairs with `RING_CELL_PUBLISH`.
+    RING_CELL_TAKE = Acquire;
+    /// Relaxed: the claim; the cell was acquired already and the head carries no data.
+    RING_HEAD_CLAIM = Relaxed;
+    /// Acquire and Release: the last arriver must see what all others did before they arrived.
+    COUNTDOWN_ARRIVE = AcqRel;
+    /// Relaxed: the counter cannot reach zero meanwhile, and whoever could take it there is
+    /// ordered after this by the hold that keeps it up.
+    COUNTDOWN_ADD = Relaxed;
+    /// Relaxed: nobody arrives before the re-armed counter was published by something else.
+    COUNTDOWN_ARM = Relaxed;
+    /// Acquire and Release: an arriver reads the objects of those before it, and is read by
+    /// those after it.
+    ARRIVALS_PUSH = AcqRel;
+    /// Relaxed: re-validated by the CAS that follows.
+    ARRIVALS_LOOK = Relaxed;
+    /// Relaxed: written before `ARRIVALS_PUSH` publishes it.
+    ARRIVALS_LINK = Relaxed;
+    /// Relaxed: read after `ARRIVALS_PUSH` acquired it.
+    ARRIVALS_FOLLOW = Relaxed;
+    /// Relaxed: nobody arrives before the frame's gate was opened, which publishes this.
+    ARRIVALS_RESET = Relaxed;
+    /// Relaxed: lists of candidates and letters are walked only by the unit's updater, after
+    /// its countdown ended.
+    LIST_LINK = Relaxed;
+    /// Relaxed: see `LIST_LINK`.
+    LIST_FOLLOW = Relaxed;
+    /// Relaxed: candidates are pushed before the gate opens, walked after it.
+    CANDIDATE_PUSH = Relaxed;
+    /// Relaxed: exclusive to the updater.
+    CANDIDATE_HEAD = Relaxed;
+    /// Relaxed: what an interaction slot says of its pair is published by the queue or the gate.
+    SLOT_FIELD = Relaxed;
+    /// Relaxed: a unit's frame tag changes only in its update and travels with the unit.
+    FRAME_TAG = Relaxed;
+    /// Relaxed: claims room in a pool; the claim carries no data.
+    POOL_CLAIM = Relaxed;
+    /// Relaxed: a pool is reset at a gate, between its last reader and its next claimer.
+    POOL_RESET = Relaxed;
+    /// Release: publishes the letter to the receiving unit's updater, also from outside.
+    MAIL_PUSH = Release;
+    /// Acquire: pairs with `MAIL_PUSH`.
+    MAIL_TAKE = Acquire;
+    /// Relaxed: stamps a letter from outside; an older stamp only delivers it sooner.
+    FRAME_OPEN_LOOK = Relaxed;
+    /// Relaxed: see `FRAME_OPEN_LOOK`.
+    FRAME_OPEN_SET = Relaxed;
+    /// Release: publishes the swap, and all that was rendered, to renderers of the next frame.
+    DISPLAY_ADVANCE = Release;
+    /// Acquire: pairs with `DISPLAY_ADVANCE`.
+    DISPLAY_LOAD = Acquire;
+    /// Relaxed: a sleeper announces itself before `FENCE_SLEEP`.
+    BELL_ANNOUNCE = Relaxed;
+    /// Relaxed: read before `FENCE_SLEEP`; a ring after that changes it.
+    BELL_EPOCH_SEEN = Relaxed;
+    /// Relaxed: decides whether to ring, after `FENCE_RING`.
+    BELL_SLEEPERS_LOOK = Relaxed;
+    /// Release: orders the pushes before the epoch that announces them.
+    BELL_EPOCH_RING = Release;
+    /// Acquire: pairs with `BELL_EPOCH_RING`.
+    BELL_EPOCH_CHECK = Acquire;
+    /// Sequentially consistent fence between announcing and looking again.
+    FENCE_SLEEP = SeqCst;
+    /// Sequentially consistent fence between pushing and looking for sleepers.
+    FENCE_RING = SeqCst;
+    /// Acquire and Release: the token's renderer moves from holder to holder.
+    TOKEN_COUNT = AcqRel;
+    /// Acquire and Release: a reader enters the newest slot; the writer learns who is inside.
+    LATEST_ENTER = AcqRel;
+    /// Relaxed: only compares indices, to skip `LATEST_ENTER`; the slot was acquired before.
+    LATEST_LOOK = Relaxed;
+    /// Acquire and Release: publishes the new value, collects the readers of the old one.
+    LATEST_PUBLISH = AcqRel;
+    /// Release: the reader is done with the slot before the writer reuses it.
+    LATEST_LEAVE = Release;
+    /// Acquire: pairs with `LATEST_LEAVE`.
+    LATEST_REUSE = Acquire;
+    /// Acquire and Release: hands a static out exactly once.
+    STATIC_TAKE = AcqRel;
+}
+
+macro_rules! atomic {
+    ($(#[$doc:meta])* $name:ident, $imp:ident, $int:ty) => {
+        $(#[$doc])*
+        #[derive(Debug)]
+        pub(crate) struct $name(imp::$imp);
+
+        #[allow(dead_code, reason = "one set of accesses for both widths")]
+        impl $name {
+            const_fn! {
+                pub(crate) const fn new(value: $int) -> Self {
+                    Self(imp::$imp::new(value))
+                }
+            }
+            #[inline(always)]
+            pub(crate) fn load(&self, site: Site) -> $int {
+                self.0.load(site.effective())
+            }
+            #[inline(always)]
+            pub(crate) fn store(&self, value: $int, site: Site) {
+                self.0.store(value, site.effective());
+            }
+            #[inline(always)]
+            pub(crate) fn swap(&self, value: $int, site: Site) -> $int {
+                self.0.swap(value, site.effective())
+            }
+            #[inline(always)]
+            pub(crate) fn fetch_add(&self, value: $int, site: Site) -> $int {
+                self.0.fetch_add(value, site.effective())
+            }
+            #[inline(always)]
+            pub(crate) fn fetch_sub(&self, value: $int, site: Site) -> $int {
+                self.0.fetch_sub(value, site.effective())
+            }
+            /// On failure the value found is only a hint for the retry, hence Relaxed.
+            #[inline(always)]
+            pub(crate) fn exchange(&self, old: $int, new: $int, site: Site) -> Result<$int, $int> {
+                self.0.compare_exchange(old, new, site.effective(), Ordering::Relaxed)
+            }
+        }
+    };
+}
+
+atomic!(/// 32 bits: counters, tags, links: what a unit or a slot carries.
+    Atomic, AtomicU32, u32);
+atomic!(/// A machine word: the ring's cells (cycle and index) and positions.
+    AtomicWord, AtomicUsize, usize);
+
+/// A fence whose order is a named site.
+#[inline(always)]
+pub(crate) fn fence(site: Site) {
+    let order = site.effective();
+    // A mutant may turn the fence off; Relaxed is no valid order for one.
+    if order != Ordering::Relaxed {
+        imp::fence(order);
+    }
+}
+
+/// Says inside a retry loop that another thread has to move first.
+#[inline(always)]
+pub(crate) fn spin_hint() {
+    #[cfg(loom)]
+    loom::hint::spin_loop();
+    #[cfg(not(loom))]
+    ::core::hint::spin_loop();
+}
+
+/// Interior memory whose exclusive and shared lends the protocol guarantees and loom watches.
+#[derive(Debug)]
+pub(crate) struct Cell<T>(
+    #[cfg(loom)] loom::cell::UnsafeCell<T>,
+    #[cfg(not(loom))] ::core::cell::UnsafeCell<T>,
+);
+
+// SAFETY: the protocol lends the content either shared (needs `Sync`) or exclusively (needs
+// `Send`); each lend is a call of `with` or `with_mut`, whose callers state why it is allowed.
+unsafe impl<T: Send + Sync> Sync for Cell<T> {}
+
+impl<T> Cell<T> {
+    const_fn! {
+        pub(crate) const fn new(value: T) -> Self {
+            #[cfg(loom)]
+            return Self(loom::cell::UnsafeCell::new(value));
+            #[cfg(not(loom))]
+            return Self(::core::cell::UnsafeCell::new(value));
+        }
+    }
+
+    /// Lends the content read-only.
+    ///
+    /// # Safety
+    /// Nobody may have it exclusively until `f` returns.
+    #[inline(always)]
+    pub(crate) unsafe fn with<R>(&self, f: impl FnOnce(&T) -> R) -> R {
+        #[cfg(loom)]
+        // SAFETY: the caller's promise; loom checks it.
+        return self.0.with(|p| f(unsafe { &*p }));
+        #[cfg(not(loom))]
+        // SAFETY: the caller's promise.
+        return f(unsafe { &*self.0.get() });
+    }
+
+    /// Lends the content exclusively.
+    ///
+    /// # Safety
+    /// Nobody else may have it, shared or exclusively, until `f` returns.
+    #[inline(always)]
+    pub(crate) unsafe fn with_mut<R>(&self, f: impl FnOnce(&mut T) -> R) -> R {
+        #[cfg(loom)]
+        // SAFETY: the caller's promise; loom checks it.
+        return self.0.with_mut(|p| f(unsafe { &mut *p }));
+        #[cfg(not(loom))]
+        // SAFETY: the caller's promise.
+        return f(unsafe { &mut *self.0.get() });
+    }
+
+    /// The content, by exclusive access to the cell itself.
+    pub(crate) fn get_mut(&mut self) -> &mut T {
+        #[cfg(loom)]
+        // SAFETY: `&mut self` excludes every other lend.
+        return self.0.with_mut(|p| unsafe { &mut *p });
+        #[cfg(not(loom))]
+        return self.0.get_mut();
+    }
+
+    /// Takes the content out of a cell that is owned.
+    pub(crate) fn into_inner(self) -> T {
+        self.0.into_inner()
+    }
+}

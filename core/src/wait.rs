@@ -1,0 +1,125 @@
+//! Waiting without missing a wake-up, and without burning a core.
+//!
+//! The core waits for nobody by itself: a host says through [`Waiting`] how a worker sleeps
+//! (spin, WFE/SEV, a futex, a condition variable) and the bells here make it sound. A sleeper
+//! announces itself, fences, and looks for work again; a worker that queued work fences and looks
+//! for sleepers. Of two fences one is first, so one of the two sees the other.
+
+use crossbeam_utils::CachePadded;
+
+use crate::sync::{Atomic, fence, site};
+
+/// How a host's workers sleep and are woken.
+pub trait Waiting: Sync {
+    /// Returns once `bell` has been rung past `seen`; may return earlier.
+    fn sleep(&self, bell: &Bell, seen: Epoch);
+
+    /// Wakes up to `count` workers that sleep on `bell`. Called after the bell's epoch moved on.
+    fn wake(&self, bell: &Bell, count: u32);
+}
+
+/// Waits by looking again and again: for a host that has its cores to itself.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Spin;
+
+impl Waiting for Spin {
+    fn sleep(&self, bell: &Bell, seen: Epoch) {
+        while !bell.rung_since(seen) {
+            crate::sync::spin_hint();
+        }
+    }
+
+    fn wake(&self, _: &Bell, _: u32) {}
+}
+
+impl<W: Waiting + ?Sized> Waiting for &W {
+    fn sleep(&self, bell: &Bell, seen: Epoch) {
+        (**self).sleep(bell, seen);
+    }
+
+    fn wake(&self, bell: &Bell, count: u32) {
+        (**self).wake(bell, count);
+    }
+}
+
+/// How often a bell had been rung.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Epoch(u32);
+
+/// What sleeping workers listen to. Token holders have their own, so that a call to render never
+/// wakes a worker that cannot.
+#[derive(Debug)]
+pub struct Bell {
+    epoch: CachePadded<Atomic>,
+    sleepers: CachePadded<Atomic>,
+    for_holders: bool,
+}
+
+impl Bell {
+    pub(crate) fn new(for_holders: bool) -> Self {
+        Self {
+            epoch: CachePadded::new(Atomic::new(0)),
+            sleepers: CachePadded::new(Atomic::new(0)),
+            for_holders,
+        }
+    }
+
+    /// Whether the token's holders listen to this bell, or all other workers.
+    pub fn is_for_holders(&self) -> bool {
+        self.for_holders
+    }
+
+    /// Whether the bell was rung after `seen` was taken.
+    #[inline]
+    pub fn rung_since(&self, seen: Epoch) -> bool {
+        self.epoch.load(site::BELL_EPOCH_CHECK) != seen.0
+    }
+
+    /// Sleeps unless `look` still finds work after the announcement.
+    pub(crate) fn sleep_unless(&self, waiting: &impl Waiting, look: impl FnOnce() -> bool) {
+        self.sleepers.fetch_add(1, site::BELL_ANNOUNCE);
+        let seen = Epoch(self.epoch.load(site::BELL_EPOCH_SEEN));
+        fence(site::FENCE_SLEEP);
+        if !look() {
+            waiting.sleep(self, seen);
+        }
+        self.sleepers.fetch_sub(1, site::BELL_ANNOUNCE);
+    }
+
+    /// Wakes up to `count` sleepers and returns how many there were to wake. The caller has
+    /// fenced with `FENCE_RING` since it queued the work.
+    pub(crate) fn ring(&self, waiting: &impl Waiting, count: u32) -> u32 {
+        let woken = self.sleepers.load(site::BELL_SLEEPERS_LOOK).min(count);
+        if woken > 0 {
+            self.epoch.fetch_add(1, site::BELL_EPOCH_RING);
+            waiting.wake(self, woken);
+        }
+        woken
+    }
+}
+
+/// The two bells of a pipeline.
+#[derive(Debug)]
+pub(crate) struct Bells {
+    pub(crate) holders: Bell,
+    pub(crate) others: Bell,
+}
+
+impl Bells {
+    pub(crate) fn new() -> Self {
+        Self { holders: Bell::new(true), others: Bell::new(false) }
+    }
+
+    /// Announces `any` work units that every worker can do, and `renders` that only holders can.
+    ///
+    /// As many sleepers are woken at once as there is work for, not one by one in a chain; a
+    /// holder only for what the others are too few for, or to render.
+    pub(crate) fn announce(&self, waiting: &impl Waiting, any: u32, renders: u32) {
+        fence(site::FENCE_RING);
+        let others = if any > 0 { self.others.ring(waiting, any) } else { 0 };
+        let for_holders = any - others + renders;
+        if for_holders > 0 {
+            self.holders.ring(waiting, for_holders);
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! Workers: one step, one work unit (§5.3).
+
+use crate::environment::Environment;
+use crate::error::TableFull;
+use crate::migrate::migrate;
+use crate::pipeline::Pipeline;
+use crate::probe::{NoProbe, Probe};
+use crate::stage::Stage;
+use crate::token::Token;
+use crate::unit::Work;
+use crate::wait::{Spin, Waiting};
+
+/// What a step did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// One work unit of this stage.
+    Worked(Stage),
+    /// Nothing: no work was visible. A hint, and may be stale.
+    Idle,
+}
+
+/// Takes what a work unit sets free.
+pub(crate) trait Outputs {
+    /// `work` can be done now, by this worker too.
+    fn emit(&mut self, work: Work);
+    /// `work` can be done now, but not by this worker.
+    fn queue(&mut self, work: Work);
+    /// Work that was queued already can be done now, by holders.
+    fn renders_visible(&mut self);
+    /// The pipeline is at rest.
+    fn all_done(&mut self);
+}
+
+/// Carry-over (§4.2): the first output is carried, the others are queued; and how many sleepers
+/// the queued ones are to wake.
+struct Carry<'p, 'm, E: Environment, W: Waiting> {
+    pipeline: &'p Pipeline<'m, E, W>,
+    work: Option<Work>,
+    queued: u32,
+    renders: u32,
+}
+
+impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
+    /// Gives what is carried to whoever comes first.
+    fn shed(&mut self) {
+        if let Some(work) = self.work.take() {
+            self.queue(work);
+        }
+    }
+
+    fn announce(&mut self) {
+        if self.queued > 0 || self.renders > 0 {
+            self.pipeline.bells.announce(&self.pipeline.waiting, self.queued, self.renders);
+            (self.queued, self.renders) = (0, 0);
+        }
+    }
+}
+
+impl<E: Environment, W: Waiting> Outputs for Carry<'_, '_, E, W> {
+    #[inline]
+    fn emit(&mut self, work: Work) {
+        if self.work.is_none() {
+            self.work = Some(work);
+        } else {
+            self.queue(work);
+        }
+    }
+
+    #[inline]
+    fn queue(&mut self, work: Work) {
+        self.pipeline.push(work);
+        match Stage::of(work) {
+            Stage::Render => self.renders += 1,
+            _ => self.queued += 1,
+        }
+    }
+
+    fn renders_visible(&mut self) {
+        self.renders = u32::MAX / 2;
+    }
+
+    fn all_done(&mut self) {
+        (self.queued, self.renders) = (u32::MAX / 2, u32::MAX / 2);
+    }
+}
+
+/// A worker, driven by its host: in a thread, a task, an interrupt-driven loop, a simulator.
+///
+/// Dropping it is leaving: what it carries goes to the queues, and the others carry on.
+pub struct Worker<'p, 'm, E: Environment, W: Waiting = Spin, P: Probe = NoProbe> {
+    carry: Carry<'p, 'm, E, W>,
+    stage: Stage,
+    token: Option<Token<'p, E::Renderer>>,
+    probe: P,
+}
+
+impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
+    pub(crate) fn new(pipeline: &'p Pipeline<'m, E, W>, probe: P) -> Self {
+        let carry = Carry { pipeline, work: None, queued: 0, renders: 0 };
+        Self { carry, stage: Stage::BroadPhase, token: None, probe }
+    }
+
+    /// A worker like this one, new, watched by `probe`.
+    pub fn probed<Q: Probe>(self, probe: Q) -> Worker<'p, 'm, E, W, Q> {
+        Worker::new(self.carry.pipeline, probe)
+    }
+
+    /// Gives this worker the right to render, and its renderer.
+    ///
+    /// # Errors
+    /// The token back, if it is another pipeline's or if this worker has one.
+    pub fn hold(&mut self, token: Token<'p, E::Renderer>) -> Result<(), Token<'p, E::Renderer>> {
+        if self.token.is_some() || !token.is_from(&self.carry.pipeline.office) {
+            return Err(token);
+        }
+        self.token = Some(token);
+        Ok(())
+    }
+
+    /// Takes the token away, to give it to another worker.
+    pub fn release(&mut self) -> Option<Token<'p, E::Renderer>> {
+        // A carried rendering stays behind for the next holder.
+        self.carry.shed();
+        self.carry.announce();
+        self.token.take()
+    }
+
+    /// The token, to reach the renderer between two steps.
+    pub fn token(&mut self) -> Option<&mut Token<'p, E::Renderer>> {
+        self.token.as_mut()
+    }
+
+    /// The probe.
+    pub fn probe(&mut self) -> &mut P {
+        &mut self.probe
+    }
+
+    /// Does at most one work unit and says what it did.
+    ///
+    /// # Errors
+    /// The callback's error, or a full table of candidates. The work unit counts as done either
+    /// way, and the pipeline is sound: stepping may go on.
+    pub fn step(&mut self, env: &E) -> Result<Step, E::Error> {
+        let Some(work) = self.next_work() else { return Ok(Step::Idle) };
+        self.stage = Stage::of(work);
+        let pipeline = self.carry.pipeline;
+        let frame = pipeline.frame_of(work);
+        self.probe.begin(work, frame);
+        let outcome = match (work, &mut self.token) {
+            (Work::Enter(unit), _) => pipeline
+                .enter(env, unit, &mut self.carry)
+                .map_err(<E::Error as From<TableFull>>::from),
+            (Work::Interact(id), _) => pipeline.interact(env, id, &mut self.carry),
+            (Work::Update(unit), token) => {
+                pipeline.update(env, unit, token.is_some(), &mut self.carry)
+            }
+            (Work::Render(unit), Some(token)) => pipeline.render(env, unit, token, &mut self.carry),
+            (Work::Render(_), None) => {
+                self.carry.queue(work);
+                Ok(())
+            }
+        };
+        self.probe.end(work, frame);
+        self.carry.announce();
+        outcome.map(|()| Step::Worked(self.stage))
+    }
+
+    /// What is carried, or what migration finds (Fig. 8).
+    fn next_work(&mut self) -> Option<Work> {
+        let pipeline = self.carry.pipeline;
+        let holder = self.token.is_some();
+        // Rendering first: only holders can, and a chain of carry-overs must not starve it.
+        if holder
+            && !matches!(self.carry.work, Some(Work::Render(_)))
+            && pipeline.render_visible()
+            && let Some(work) = pipeline.pop(Stage::Render)
+        {
+            self.carry.shed();
+            return Some(work);
+        }
+        if let Some(work) = self.carry.work.take() {
+            return Some(work);
+        }
+        // Visible work may be gone when it is popped: look again, but no stage more than once,
+        // so that a step is bounded.
+        for _ in Stage::ALL {
+            let stage = migrate(self.stage, pipeline.visible(holder))?;
+            if let Some(work) = pipeline.pop(stage) {
+                return Some(work);
+            }
+        }
+        None
+    }
+
+    /// Whether a step would find work now, or the pipeline is at rest.
+    pub fn has_cause_to_wake(&self) -> bool {
+        let pipeline = self.carry.pipeline;
+        self.carry.work.is_some()
+            || !pipeline.visible(self.token.is_some()).is_empty()
+            || pipeline.finished()
+    }
+
+    /// Sleeps, in the host's way of [`Waiting`], until there is cause to wake; may return earlier.
+    pub fn wait(&self) {
+        let pipeline = self.carry.pipeline;
+        let bells = &pipeline.bells;
+        let bell = if self.token.is_some() { &bells.holders } else { &bells.others };
+        bell.sleep_unless(&pipeline.waiting, || self.has_cause_to_wake());
+    }
+}
+
+impl<E: Environment, W: Waiting> Drop for Carry<'_, '_, E, W> {
+    fn drop(&mut self) {
+        self.shed();
+        self.announce();
+    }
+}

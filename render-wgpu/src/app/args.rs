@@ -1,0 +1,185 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::error::ErrorKind;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use dualframe_sim::blocking::{Blocking, Grain};
+use dualframe_sim::executor::{Entry, ExecutorKind, MAX_THREADS};
+use dualframe_sim::pool::cores;
+use dualframe_sim::scene::ParticleScene;
+
+/// The most frames of one run: each takes 24 bytes of the report.
+const MAX_FRAMES: u64 = 10_000_000;
+/// The most particles whose every pair can be modelled; the six walls come on top.
+const MAX_PAIRWISE: usize = Blocking::MAX_PAIRWISE_OBJECTS - 6;
+
+/// Realtime, physically based virtual environments on all cores.
+#[derive(Parser)]
+#[command(name = "dualframe", version, args_conflicts_with_subcommands = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    particles: Particles,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Deformable particles in a room of six walls (the default).
+    Particles(Particles),
+}
+
+/// Arguments of the particle environment.
+#[derive(Args)]
+#[command(after_help = format!("With --broad-phase pairwise there can be {MAX_PAIRWISE} particles at most."))]
+pub(super) struct Particles {
+    /// Number of particles.
+    #[arg(long, value_name = "N", default_value_t = 300, value_parser = parse_objects,
+          help = format!("Number of particles, 1 to {}", ParticleScene::MAX_OBJECTS))]
+    pub(super) objects: usize,
+    #[arg(long, value_name = "N", default_value_t = 800,
+          value_parser = clap::value_parser!(u64).range(1..=MAX_FRAMES),
+          help = format!("Number of frames, 1 to {MAX_FRAMES}"))]
+    pub(super) frames: u64,
+    #[arg(long, value_name = "N", default_value_t = cores().min(MAX_THREADS),
+          value_parser = parse_threads,
+          help = format!("Number of threads, 1 to {MAX_THREADS}; all cores if not given"))]
+    pub(super) threads: usize,
+    /// What velocities and substeps are drawn from.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Let the particles fall.
+    #[arg(long)]
+    pub(super) gravity: bool,
+    /// What drives the stages.
+    #[arg(long, value_name = "NAME", value_enum, default_value_t = ExecutorName::Pipeline)]
+    pub(super) executor: ExecutorName,
+    /// Blocks of close particles, or every modelled pair.
+    #[arg(long, value_name = "KIND", value_enum, default_value_t = BroadPhaseName::Spatial)]
+    broad_phase: BroadPhaseName,
+    /// Frames that the pipeline works on at once, 1 or 2.
+    #[arg(long, value_name = "N", default_value_t = 2,
+          value_parser = clap::value_parser!(u8).range(1..=2))]
+    pub(super) frames_in_flight: u8,
+    /// Show a window (not there yet).
+    #[arg(long, conflicts_with_all = ["headless", "offscreen"])]
+    window: bool,
+    /// Run without a picture (as it does now).
+    #[arg(long, conflicts_with = "offscreen")]
+    headless: bool,
+    /// Draw without a window (not there yet).
+    #[arg(long)]
+    offscreen: bool,
+    /// Write a picture of the last frame (not there yet).
+    #[arg(long, value_name = "FILE.png")]
+    picture: Option<PathBuf>,
+    /// Write the report as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub(super) json: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(super) enum ExecutorName {
+    Pipeline,
+    Serial,
+    Static,
+    Rayon,
+    RayonOverlapped,
+}
+
+impl From<ExecutorName> for ExecutorKind {
+    fn from(name: ExecutorName) -> Self {
+        match name {
+            ExecutorName::Pipeline => Self::Pipeline,
+            ExecutorName::Serial => Self::Serial,
+            ExecutorName::Static => Self::Static,
+            ExecutorName::Rayon => Self::Rayon,
+            ExecutorName::RayonOverlapped => Self::RayonOverlapped,
+        }
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum BroadPhaseName {
+    Spatial,
+    Pairwise,
+}
+
+impl Particles {
+    pub(super) fn grain(&self) -> Grain {
+        match self.broad_phase {
+            BroadPhaseName::Spatial => Grain::Spatial,
+            BroadPhaseName::Pairwise => Grain::Pairwise,
+        }
+    }
+
+    pub(super) fn entry(&self) -> Entry {
+        if self.frames_in_flight == 1 { Entry::AfterSwap } else { Entry::AfterUpdate }
+    }
+
+    /// What fits no single argument.
+    fn check(self) -> Result<Self, String> {
+        let missing = [
+            (self.window, "--window"),
+            (self.offscreen, "--offscreen"),
+            (self.picture.is_some(), "--picture"),
+        ];
+        if let Some((_, name)) = missing.iter().find(|(given, _)| *given) {
+            return Err(format!("{name} is not there yet: this version draws no pictures"));
+        }
+        if self.grain() == Grain::Pairwise && self.objects > MAX_PAIRWISE {
+            let objects = self.objects;
+            return Err(format!(
+                "--objects {objects}: --broad-phase pairwise allows {MAX_PAIRWISE} particles"
+            ));
+        }
+        Ok(self)
+    }
+}
+
+fn parse_objects(text: &str) -> Result<usize, String> {
+    parse_number(text, ParticleScene::MAX_OBJECTS)
+}
+
+fn parse_threads(text: &str) -> Result<usize, String> {
+    parse_number(text, MAX_THREADS)
+}
+
+fn parse_number(text: &str, most: usize) -> Result<usize, String> {
+    let number = text.parse().ok().filter(|number| (1..=most).contains(number));
+    number.ok_or_else(|| format!("not a whole number from 1 to {most}"))
+}
+
+/// What the arguments ask for.
+pub(super) enum Outcome {
+    Run(Particles),
+    /// Help or version, already printed.
+    Told,
+    /// One line that says what is wrong.
+    Bad(String),
+}
+
+pub(super) fn parse() -> Outcome {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return refuse(&error),
+    };
+    let particles = match cli.command {
+        Some(Command::Particles(particles)) => particles,
+        None => cli.particles,
+    };
+    particles.check().map_or_else(Outcome::Bad, Outcome::Run)
+}
+
+fn refuse(error: &clap::Error) -> Outcome {
+    if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
+        // A closed pipe is no concern of somebody who asked for help.
+        let _printed = error.print();
+        return Outcome::Told;
+    }
+    // The first line says what is wrong; the rest is usage.
+    let text = error.to_string();
+    let line = text.lines().next().unwrap_or("bad arguments");
+    Outcome::Bad(line.strip_prefix("error: ").unwrap_or(line).to_owned())
+}

@@ -1,0 +1,159 @@
+//! What a run comes to: a table for people, JSON for programs.
+
+use std::fs::{File, OpenOptions};
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use dualframe_sim::executor::StageSeconds;
+use dualframe_sim::object::{Fault, FaultKind, ObjectId};
+use serde::{Serialize, Serializer};
+
+/// A run's report. The JSON keys stay as they are; more may come.
+#[derive(Serialize)]
+pub(super) struct Report {
+    pub(super) scene: &'static str,
+    pub(super) executor: &'static str,
+    pub(super) threads: usize,
+    pub(super) objects: usize,
+    pub(super) nodes: usize,
+    pub(super) springs: usize,
+    pub(super) frames: u64,
+    pub(super) seed: u64,
+    pub(super) gravity: bool,
+    pub(super) frames_in_flight: u8,
+    pub(super) seconds: f64,
+    pub(super) fps: f64,
+    /// Over the serial executor, on the same first frames.
+    pub(super) speed_up: f64,
+    pub(super) frame_ms: FrameMilliseconds,
+    pub(super) candidates: Vec<u32>,
+    pub(super) collisions: Vec<u32>,
+    pub(super) state_hash: String,
+    pub(super) allocations: usize,
+    pub(super) stage_seconds: Vec<WorkerSeconds>,
+    pub(super) quarantined: Vec<Quarantined>,
+    pub(super) non_finite: usize,
+}
+
+/// Percentiles of the times from swap to swap, in milliseconds.
+#[derive(Serialize)]
+pub(super) struct FrameMilliseconds {
+    p50: f64,
+    p99: f64,
+    p999: f64,
+    max: f64,
+}
+
+impl FrameMilliseconds {
+    /// Of times in nanoseconds; zeros if there are none.
+    pub(super) fn of(nanoseconds: &[u64]) -> Self {
+        let mut sorted = nanoseconds.to_vec();
+        sorted.sort_unstable();
+        // The nearest rank: the smallest time that at least this share of the frames kept to.
+        let at = |share: f64| {
+            let rank = (share * sorted.len() as f64).ceil() as usize;
+            let time = sorted.get(rank.saturating_sub(1)).copied().unwrap_or(0);
+            time as f64 * 1e-6
+        };
+        Self { p50: at(0.5), p99: at(0.99), p999: at(0.999), max: at(1.0) }
+    }
+}
+
+/// Seconds of one worker.
+#[derive(Serialize)]
+pub(super) struct WorkerSeconds {
+    broad_phase: f64,
+    interaction: f64,
+    update: f64,
+    render: f64,
+    idle: f64,
+}
+
+impl From<&StageSeconds> for WorkerSeconds {
+    fn from(seconds: &StageSeconds) -> Self {
+        let StageSeconds { broad_phase, interaction, update, render, idle } = *seconds;
+        Self { broad_phase, interaction, update, render, idle }
+    }
+}
+
+/// An object that was taken out.
+#[derive(Serialize)]
+pub(super) struct Quarantined {
+    object: u32,
+    #[serde(serialize_with = "as_text")]
+    fault: FaultKind,
+    frame: u64,
+}
+
+fn as_text<S: Serializer>(fault: &FaultKind, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(fault)
+}
+
+impl From<&(ObjectId, Fault)> for Quarantined {
+    fn from(&(object, Fault { kind, frame }): &(ObjectId, Fault)) -> Self {
+        Self { object: object.0, fault: kind, frame }
+    }
+}
+
+/// Opens the file that the JSON will be written to, without touching what is in it yet.
+pub(super) fn open(path: &Path) -> Result<File, String> {
+    let opened = OpenOptions::new().write(true).create(true).truncate(false).open(path);
+    opened.map_err(|error| format!("cannot write {}: {error}", path.display()))
+}
+
+impl Report {
+    /// Whether every object came through.
+    pub(super) fn is_sound(&self) -> bool {
+        self.quarantined.is_empty()
+    }
+
+    /// Writes the report as one JSON object.
+    pub(super) fn write(&self, file: File) -> Result<(), String> {
+        let written = file.set_len(0).and_then(|()| {
+            let mut writer = BufWriter::new(file);
+            serde_json::to_writer(&mut writer, self)?;
+            writer.write_all(b"\n")?;
+            writer.flush()
+        });
+        written.map_err(|error| format!("cannot write the JSON: {error}"))
+    }
+
+    /// Prints the closing table.
+    pub(super) fn print(&self) {
+        // A closed pipe must not turn a sound run into a panic.
+        let _printed = self.table(&mut std::io::stdout().lock());
+    }
+
+    fn table(&self, out: &mut impl Write) -> std::io::Result<()> {
+        let Self { executor, threads, objects, frames, seconds, fps, frame_ms, .. } = self;
+        writeln!(
+            out,
+            "particles: {objects} objects, {} nodes, {} springs; {frames} frames, seed {}",
+            self.nodes, self.springs, self.seed
+        )?;
+        writeln!(out, "{executor} on {threads} threads: {fps:.1} fps, {seconds:.3} s")?;
+        let speed_up = self.speed_up;
+        writeln!(out, "speed-up over the serial run: {speed_up:.2} (first frames of both)")?;
+        let FrameMilliseconds { p50, p99, p999, max } = frame_ms;
+        writeln!(
+            out,
+            "frame time, ms: median {p50:.3}, 99 % {p99:.3}, 99.9 % {p999:.3}, longest {max:.3}"
+        )?;
+        let collisions: u64 = self.collisions.iter().map(|&count| u64::from(count)).sum();
+        let mean = collisions as f64 / self.collisions.len().max(1) as f64;
+        writeln!(out, "collisions a frame: {mean:.1}; allocations: {}", self.allocations)?;
+        writeln!(out, "state hash: {}", self.state_hash)?;
+        writeln!(out, "\nseconds  broad phase  interaction   update   render     idle")?;
+        for (index, worker) in self.stage_seconds.iter().enumerate() {
+            let WorkerSeconds { broad_phase, interaction, update, render, idle } = worker;
+            writeln!(
+                out,
+                "{index:7}  {broad_phase:11.3}  {interaction:11.3}  {update:7.3}  {render:7.3}  {idle:7.3}"
+            )?;
+        }
+        for Quarantined { object, fault, frame } in &self.quarantined {
+            writeln!(out, "quarantined: object {object}, {fault} in frame {frame}")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,120 @@
+//! The pipeline's tables on the heap.
+
+use dualframe_core::contacts::{ContactSlot, SegmentSlot};
+use dualframe_core::environment::Environment;
+use dualframe_core::inbox::LetterSlot;
+use dualframe_core::ring::QueueSlot;
+use dualframe_core::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
+use dualframe_core::unit::UnitId;
+
+use super::host::Parcel;
+use crate::block::Block;
+use crate::interaction::Contact;
+use crate::object::Object;
+use crate::stages::Stages;
+
+/// Contact records a frame for each object at first; usually 96, twice what the densest pile has.
+const CONTACTS_PER_OBJECT: usize = 96;
+/// Contact records a frame that there is room for at least, however few the objects.
+const FEWEST_CONTACTS: usize = 4_096;
+/// Letters that may be under way at once: for each object, and at least.
+const LETTERS_PER_OBJECT: usize = 4;
+const FEWEST_LETTERS: usize = 1_024;
+/// Blocks up to which there is room for every pair of them to be candidates at once.
+const ALL_PAIRS_BLOCKS: usize = 512;
+/// Candidates a frame for each block beyond that; a block has some 26 neighbours.
+const CANDIDATES_PER_BLOCK: usize = 128;
+
+/// All tables, sized for an environment, kept from run to run.
+pub(super) struct Tables {
+    units: Vec<UnitSlot<Block>>,
+    interactions: Vec<InteractionSlot<()>>,
+    contacts: Vec<ContactSlot<Contact>>,
+    segments: Vec<SegmentSlot>,
+    letters: Vec<LetterSlot<Parcel>>,
+    queues: Vec<QueueSlot>,
+}
+
+impl Tables {
+    pub(super) fn new(blocks: &[Block], interactions: Vec<InteractionSlot<()>>) -> Self {
+        let objects: usize = blocks.iter().map(|block| block.objects().len()).sum();
+        let contacts = 2 * (objects * CONTACTS_PER_OBJECT + FEWEST_CONTACTS);
+        let letters = objects * LETTERS_PER_OBJECT + FEWEST_LETTERS;
+        let queues = queue_slots(blocks.len(), interactions.len(), letters);
+        Self {
+            units: Vec::with_capacity(blocks.len()),
+            interactions,
+            contacts: filled(contacts, ContactSlot::new),
+            segments: filled(contacts, SegmentSlot::new),
+            letters: filled(letters, LetterSlot::new),
+            queues: filled(queues, QueueSlot::new),
+        }
+    }
+
+    /// Moves the blocks into the units' slots.
+    pub(super) fn load(&mut self, blocks: &mut Vec<Block>) {
+        self.units.extend(blocks.drain(..).map(|block| {
+            let solitary = block.objects().iter().all(Object::is_solitary);
+            if solitary { UnitSlot::solitary(block) } else { UnitSlot::new(block) }
+        }));
+    }
+
+    /// Moves the blocks back.
+    pub(super) fn unload(&mut self, blocks: &mut Vec<Block>) {
+        blocks.extend(self.units.drain(..).map(UnitSlot::into_object));
+    }
+
+    pub(super) fn lend<E>(&mut self) -> Memory<'_, E>
+    where
+        E: Environment<Object = Block, Interaction = (), Contact = Contact, Message = Parcel>,
+    {
+        Memory {
+            units: &mut self.units,
+            interactions: &mut self.interactions,
+            contacts: &mut self.contacts,
+            segments: &mut self.segments,
+            letters: &mut self.letters,
+            queues: &mut self.queues,
+        }
+    }
+
+    /// Contact records that one frame may have.
+    pub(super) fn contact_capacity(&self) -> usize {
+        self.contacts.len() / 2
+    }
+
+    /// Doubles the room for contacts.
+    pub(super) fn double_contacts(&mut self) {
+        let size = 2 * self.contacts.len();
+        self.contacts.resize_with(size, ContactSlot::new);
+        self.segments.resize_with(size, SegmentSlot::new);
+    }
+}
+
+fn filled<T>(count: usize, slot: impl Fn() -> T) -> Vec<T> {
+    std::iter::repeat_with(slot).take(count).collect()
+}
+
+/// Room for the pairs of blocks that a frame may find near each other.
+pub(super) fn spare_interactions(blocks: usize) -> Vec<InteractionSlot<()>> {
+    let candidates = if blocks <= ALL_PAIRS_BLOCKS {
+        blocks * (blocks + 1) / 2
+    } else {
+        blocks * CANDIDATES_PER_BLOCK
+    };
+    filled(2 * candidates, || InteractionSlot::spare(()))
+}
+
+/// Every pair of blocks that an interaction is modelled for.
+pub(super) fn modelled_interactions(stages: &Stages, blocks: &[Block]) -> Vec<InteractionSlot<()>> {
+    let mut interactions = Vec::new();
+    for (first, a) in blocks.iter().enumerate() {
+        for (second, b) in blocks.iter().enumerate().skip(first + 1) {
+            if stages.rules.apply(a.groups(), b.groups()) {
+                let ends = [first, second].map(|index| UnitId(index as u32));
+                interactions.push(InteractionSlot::between(ends[0], ends[1], ()));
+            }
+        }
+    }
+    interactions
+}

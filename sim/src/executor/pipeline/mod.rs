@@ -1,0 +1,149 @@
+//! The dual-frame pipeline (§5) over the core: blocks are its units, threads its workers.
+//!
+//! Frames run in batches of [`FRAMES_PER_BLOCKING`](crate::blocking::FRAMES_PER_BLOCKING). Between two batches the pipeline is at rest:
+//! blocks are formed anew, tables grow if they have come to be half full, threads join.
+
+mod clock;
+mod host;
+mod memory;
+mod run;
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use dualframe_core::error::TableFull;
+use dualframe_core::inbox::From;
+use dualframe_core::pipeline::{BroadPhase, Config, Pipeline};
+
+pub use dualframe_core::frame::Entry;
+
+use self::host::{Parcel, Screen, Shared};
+use self::memory::{Tables, modelled_interactions, spare_interactions};
+use self::run::{Context, Regrouping, Report};
+use super::{Executor, ExecutorError, FrameRecord, StageSeconds};
+use crate::block::Block;
+use crate::blocking::{Blocking, Grain};
+use crate::message::Message;
+use crate::object::{Object, ObjectId};
+use crate::pool::{Crew, Pool};
+use crate::render::Renderer;
+use crate::scene::Scene;
+use crate::stages::Stages;
+
+/// Advances an environment by the pipeline. The calling thread is worker number 0 and holds the
+/// render token.
+pub struct PipelineExecutor {
+    stages: Stages,
+    blocks: Vec<Block>,
+    blocking: Blocking,
+    tables: Tables,
+    config: Config,
+    grain: Grain,
+    pool: Arc<Pool>,
+    frame: u64,
+    objects: usize,
+    /// Messages for the next frame.
+    mail: Vec<(From, Parcel)>,
+    seconds: Vec<StageSeconds>,
+    failure: Option<TableFull>,
+}
+
+impl PipelineExecutor {
+    /// An executor of `scene` on the threads of `pool`, which may be resized at any time.
+    ///
+    /// # Errors
+    /// More objects than the grain allows.
+    pub fn new(
+        scene: Scene,
+        grain: Grain,
+        entry: Entry,
+        pool: Arc<Pool>,
+    ) -> Result<Self, ExecutorError> {
+        let Scene { objects, stages } = scene;
+        let count = objects.len();
+        let (blocking, blocks) = Blocking::new(objects, grain, pool.threads())?;
+        let (broad_phase, interactions) = match grain {
+            Grain::Spatial => (BroadPhase::Spatial, spare_interactions(blocks.len())),
+            Grain::Pairwise => (BroadPhase::Pairwise, modelled_interactions(&stages, &blocks)),
+        };
+        Ok(Self {
+            tables: Tables::new(&blocks, interactions),
+            stages,
+            blocks,
+            blocking,
+            config: Config { broad_phase, entry, tokens: 1 },
+            grain,
+            pool,
+            frame: 0,
+            objects: count,
+            mail: Vec::new(),
+            seconds: Vec::new(),
+            failure: None,
+        })
+    }
+
+    /// Runs up to `frames` frames with the tables as they are, and says how many it ran.
+    fn run(
+        &mut self,
+        frames: u64,
+        renderer: &mut dyn Renderer,
+        on_frame: &mut dyn FnMut(&FrameRecord),
+    ) -> Result<u64, ExecutorError> {
+        let most_contacts = self.tables.contact_capacity() / 2;
+        let shared = Shared::new(&self.stages, self.frame, self.objects);
+        self.tables.load(&mut self.blocks);
+        let crew = Crew::default();
+        let pipeline = Pipeline::new(self.tables.lend(), self.config, &crew)?;
+        let seconds = std::mem::take(&mut self.seconds);
+        let report = Mutex::new(Report { seconds, failure: None });
+        let context = Context { shared: &shared, crew: &crew, pool: &self.pool, report: &report };
+        let regrouping = Regrouping {
+            blocking: (self.grain == Grain::Spatial).then_some(&mut self.blocking),
+            mail: &mut self.mail,
+            most_contacts,
+        };
+        let done = context.run(frames, pipeline, regrouping, Screen { renderer, on_frame });
+        let report = report.into_inner().unwrap_or_else(PoisonError::into_inner);
+        self.tables.unload(&mut self.blocks);
+        self.frame += done;
+        (self.seconds, self.failure) = (report.seconds, report.failure);
+        self.failure.map_or(Ok(done), |full| Err(full.into()))
+    }
+}
+
+impl Executor for PipelineExecutor {
+    fn advance(
+        &mut self,
+        frames: u64,
+        renderer: &mut dyn Renderer,
+        on_frame: &mut dyn FnMut(&FrameRecord),
+    ) -> Result<(), ExecutorError> {
+        let end = self.frame + frames;
+        if let Some(full) = self.failure {
+            return Err(full.into());
+        }
+        while self.frame < end {
+            self.run(end - self.frame, renderer, on_frame)?;
+            if self.frame < end {
+                self.tables.double_contacts();
+            }
+        }
+        Ok(())
+    }
+
+    fn frame(&self) -> u64 {
+        self.frame
+    }
+
+    fn visit(&self, visit: &mut dyn FnMut(&Object)) {
+        self.blocks.iter().flat_map(Block::objects).for_each(visit);
+    }
+
+    fn post(&mut self, to: ObjectId, message: Message) {
+        let from = From { sender: ObjectId::HOST.0, sequence: self.mail.len() as u32 };
+        self.mail.push((from, Parcel { to, message }));
+    }
+
+    fn stage_seconds(&self) -> Vec<StageSeconds> {
+        self.seconds.clone()
+    }
+}

@@ -1,0 +1,247 @@
+//! Frames run with the same tables: batches, and the threads that work on them.
+
+use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard};
+use std::thread;
+
+use dualframe_core::error::TableFull;
+use dualframe_core::inbox::From;
+use dualframe_core::pipeline::Pipeline;
+use dualframe_core::token::Token;
+use dualframe_core::worker::Step;
+
+use super::clock::StageClock;
+use super::host::{Host, Parcel, Screen, Shared};
+use crate::blocking::{Blocking, FRAMES_PER_BLOCKING};
+use crate::executor::StageSeconds;
+use crate::pool::{Crew, Pool};
+
+type SimPipeline<'m, 's> = Pipeline<'m, Host<'s>, &'s Crew>;
+
+/// What workers leave behind.
+pub(super) struct Report {
+    pub(super) seconds: Vec<StageSeconds>,
+    pub(super) failure: Option<TableFull>,
+}
+
+/// What is done between two batches.
+pub(super) struct Regrouping<'x> {
+    /// What forms blocks anew, where there are any.
+    pub(super) blocking: Option<&'x mut Blocking>,
+    /// Messages for the next frame.
+    pub(super) mail: &'x mut Vec<(From, Parcel)>,
+    /// Contact records of a frame beyond which the tables are to grow.
+    pub(super) most_contacts: usize,
+}
+
+impl Regrouping<'_> {
+    /// Posts the messages for the next frame to wherever their objects are now.
+    fn post_mail(
+        &mut self,
+        shared: &Shared<'_>,
+        pipeline: &SimPipeline<'_, '_>,
+    ) -> Result<(), TableFull> {
+        for (from, parcel) in self.mail.drain(..) {
+            // A message to nobody is lost.
+            if let Some(unit) = shared.unit_of(parcel.to) {
+                pipeline.post(unit, from, parcel).map_err(|rejected| rejected.full)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn take_mail(&mut self, pipeline: &mut SimPipeline<'_, '_>) {
+        pipeline.take_letters(|_, from, parcel| self.mail.push((from, parcel)));
+    }
+
+    /// Forms the blocks anew from where their objects are.
+    fn regroup(
+        &mut self,
+        shared: &Shared<'_>,
+        pipeline: &mut SimPipeline<'_, '_>,
+    ) -> Result<(), TableFull> {
+        let Some(blocking) = self.blocking.as_deref_mut() else { return Ok(()) };
+        pipeline.objects_mut().for_each(|block| blocking.drain(block));
+        blocking.split();
+        for (unit, block) in pipeline.objects_mut().enumerate() {
+            blocking.fill(unit, block);
+            shared.locate(unit, block);
+        }
+        self.take_mail(pipeline);
+        self.post_mail(shared, pipeline)
+    }
+}
+
+/// Sends everybody home, also when the calling thread unwinds out of a renderer.
+struct Dismissal<'s>(&'s Crew);
+
+impl Drop for Dismissal<'_> {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            self.0.abort();
+        }
+        self.0.close();
+    }
+}
+
+/// What all threads of a run share, besides the pipeline.
+#[derive(Clone, Copy)]
+pub(super) struct Context<'s, 'x> {
+    pub(super) shared: &'s Shared<'s>,
+    pub(super) crew: &'s Crew,
+    pub(super) pool: &'x Pool,
+    pub(super) report: &'x Mutex<Report>,
+}
+
+impl<'s> Context<'s, '_> {
+    /// Runs batch after batch until all frames are done, a table fails, or the tables are to
+    /// grow; says how many frames were done.
+    pub(super) fn run(
+        self,
+        frames: u64,
+        mut pipeline: SimPipeline<'_, 's>,
+        mut regrouping: Regrouping<'_>,
+        mut screen: Screen<'s>,
+    ) -> u64 {
+        for (unit, block) in pipeline.objects_mut().enumerate() {
+            self.shared.locate(unit, block);
+        }
+        let mut outcome = regrouping.post_mail(self.shared, &pipeline);
+        let pipeline = RwLock::new(pipeline);
+        let mut done = 0;
+        thread::scope(|scope| {
+            let _dismissal = Dismissal(self.crew);
+            let host = Host::new(self.shared);
+            let mut hired = 1;
+            while done < frames && outcome.is_ok() {
+                // Threads beyond the number wanted wait; more are hired as they are asked for.
+                while hired < self.pool.threads() {
+                    let (index, pipeline) = (hired, &pipeline);
+                    scope.spawn(move || self.attend(index, pipeline));
+                    hired += 1;
+                }
+                let batch = FRAMES_PER_BLOCKING.min(frames - done);
+                let Ok(mut resting) = pipeline.write() else { break };
+                if done > 0 {
+                    if resting.high_water().1 > regrouping.most_contacts {
+                        break;
+                    }
+                    outcome = regrouping.regroup(self.shared, &mut resting);
+                }
+                if outcome.is_err() || resting.run(batch as u32).is_err() {
+                    break;
+                }
+                drop(resting);
+                self.crew.start();
+                screen = self.lead(&read(&pipeline), &host, screen);
+                outcome = self.failure().map_or(Ok(()), Err);
+                done += batch;
+            }
+        });
+        if let Err(full) = outcome {
+            self.fail(full);
+        }
+        regrouping.take_mail(&mut pipeline.into_inner().unwrap_or_else(PoisonError::into_inner));
+        done
+    }
+
+    /// The calling thread's part in a batch: it alone renders.
+    fn lead(
+        self,
+        pipeline: &SimPipeline<'_, 's>,
+        host: &Host<'s>,
+        screen: Screen<'s>,
+    ) -> Screen<'s> {
+        match pipeline.token(screen) {
+            Ok(token) => match self.work(0, pipeline, host, Some(token)) {
+                Some(token) => token.into_renderer(),
+                None => unreachable!("a worker gives back the token it was given"),
+            },
+            Err((screen, full)) => {
+                self.fail(full);
+                screen
+            }
+        }
+    }
+
+    /// A hired thread's life.
+    fn attend(self, index: usize, pipeline: &RwLock<SimPipeline<'_, 's>>) {
+        self.pool.pin(index);
+        let host = Host::new(self.shared);
+        let mut last = 0;
+        while let Some(run) = self.crew.await_run(last, self.pool, index) {
+            let _dismissal = OnPanic(self.crew);
+            let pipeline = read(pipeline);
+            self.work(index, &pipeline, &host, None);
+            // Whoever left because fewer were wanted may be wanted again in the same batch.
+            if pipeline.finished() || self.crew.is_aborted() {
+                last = run;
+            }
+        }
+    }
+
+    /// Steps until the batch is done, or until this worker is not wanted any more.
+    fn work<'p>(
+        self,
+        index: usize,
+        pipeline: &'p SimPipeline<'_, 's>,
+        host: &Host<'s>,
+        token: Option<Token<'p, Screen<'s>>>,
+    ) -> Option<Token<'p, Screen<'s>>> {
+        let mut worker = pipeline.worker().probed(StageClock::start());
+        if let Some(token) = token
+            && let Err(token) = worker.hold(token)
+        {
+            return Some(token);
+        }
+        while index < self.pool.threads() && !self.crew.is_aborted() {
+            match worker.step(host) {
+                Ok(Step::Worked(_)) => {}
+                Ok(Step::Idle) if pipeline.finished() => break,
+                Ok(Step::Idle) => {
+                    self.crew.idle(self.pool, &worker);
+                    worker.probe().idled();
+                }
+                Err(full) => self.fail(full),
+            }
+        }
+        self.note(index, worker.probe());
+        worker.release()
+    }
+
+    fn note(self, index: usize, clock: &StageClock) {
+        let mut report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
+        if report.seconds.len() <= index {
+            report.seconds.resize(index + 1, StageSeconds::default());
+        }
+        clock.add_to(&mut report.seconds[index]);
+    }
+
+    /// Notes the first failure and makes everybody leave: a frame without some of its
+    /// interactions would not be the same for every schedule.
+    fn fail(self, full: TableFull) {
+        let mut report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
+        report.failure.get_or_insert(full);
+        drop(report);
+        self.crew.abort();
+    }
+
+    fn failure(self) -> Option<TableFull> {
+        self.report.lock().unwrap_or_else(PoisonError::into_inner).failure
+    }
+}
+
+fn read<T>(lock: &RwLock<T>) -> RwLockReadGuard<'_, T> {
+    lock.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Makes everybody leave if this thread panics: what it had in hand is lost, and the others would
+/// wait for it.
+struct OnPanic<'s>(&'s Crew);
+
+impl Drop for OnPanic<'_> {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            self.0.abort();
+        }
+    }
+}

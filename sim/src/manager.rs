@@ -1,0 +1,128 @@
+//! The VE Manager (§6.1, Fig. 9): the top-level container of an environment that runs.
+
+use std::sync::Arc;
+
+use crate::blocking::Grain;
+use crate::executor::{
+    Entry, Executor, ExecutorError, ExecutorKind, FrameRecord, MAX_THREADS, PipelineExecutor,
+    RayonExecutor, RayonOverlappedExecutor, SerialExecutor, StageSeconds, StaticExecutor,
+    state_hash,
+};
+use crate::message::Message;
+use crate::object::{Fault, Object, ObjectId};
+use crate::pool::{Pool, cores};
+use crate::render::Renderer;
+use crate::scene::Scene;
+
+/// How an environment is to be run. No setting changes a result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// What drives the stages.
+    pub executor: ExecutorKind,
+    /// Threads, the calling one included: 1 to [`MAX_THREADS`].
+    pub threads: usize,
+    /// Whether each thread is bound to a core, where the system can (pipeline only).
+    pub pinned: bool,
+    /// Blocks of objects, or every modelled pair by itself.
+    pub grain: Grain,
+    /// How far consecutive frames overlap (pipeline only).
+    pub entry: Entry,
+}
+
+impl Default for Settings {
+    /// The pipeline on all cores, by blocks, two frames in flight.
+    fn default() -> Self {
+        Self {
+            executor: ExecutorKind::Pipeline,
+            threads: cores().min(MAX_THREADS),
+            pinned: false,
+            grain: Grain::default(),
+            entry: Entry::default(),
+        }
+    }
+}
+
+/// Runs an environment.
+pub struct VeManager {
+    executor: Box<dyn Executor>,
+    pool: Arc<Pool>,
+}
+
+impl VeManager {
+    /// A manager of `scene`, before its first frame.
+    ///
+    /// # Errors
+    /// A number of threads or of objects beyond its limit, threads that cannot be had.
+    pub fn new(scene: Scene, settings: Settings) -> Result<Self, ExecutorError> {
+        let Settings { executor, threads, pinned, grain, entry } = settings;
+        if !(1..=MAX_THREADS).contains(&threads) {
+            return Err(ExecutorError::Threads { threads });
+        }
+        let pool = Arc::new(Pool::new(threads, pinned));
+        let executor: Box<dyn Executor> = match executor {
+            ExecutorKind::Pipeline => {
+                Box::new(PipelineExecutor::new(scene, grain, entry, Arc::clone(&pool))?)
+            }
+            ExecutorKind::Serial => Box::new(SerialExecutor::new(scene, grain)?),
+            ExecutorKind::Static => Box::new(StaticExecutor::new(scene, grain, threads)?),
+            ExecutorKind::Rayon => Box::new(RayonExecutor::new(scene, grain, threads)?),
+            ExecutorKind::RayonOverlapped => {
+                Box::new(RayonOverlappedExecutor::new(scene, grain, threads)?)
+            }
+        };
+        Ok(Self { executor, pool })
+    }
+
+    /// Advances by `frames` frames; see [`Executor::advance`].
+    ///
+    /// # Errors
+    /// A table of the pipeline's is full: the environment cannot go on.
+    pub fn run(
+        &mut self,
+        frames: u64,
+        renderer: &mut dyn Renderer,
+        on_frame: &mut dyn FnMut(&FrameRecord),
+    ) -> Result<(), ExecutorError> {
+        self.executor.advance(frames, renderer, on_frame)
+    }
+
+    /// The pipeline's threads, whose number may be changed while frames run. The other executors
+    /// keep the number they were built with.
+    #[must_use]
+    pub fn pool(&self) -> &Arc<Pool> {
+        &self.pool
+    }
+
+    /// Sends a message to an object, which processes it before its next update.
+    pub fn post(&mut self, to: ObjectId, message: Message) {
+        self.executor.post(to, message);
+    }
+
+    /// Shows every object in its present state, in no particular order.
+    pub fn visit(&self, visit: &mut dyn FnMut(&Object)) {
+        self.executor.visit(visit);
+    }
+
+    /// The objects that were taken out, and why, by number.
+    #[must_use]
+    pub fn quarantined(&self) -> Vec<(ObjectId, Fault)> {
+        let mut quarantined = Vec::new();
+        self.visit(&mut |object| {
+            quarantined.extend(object.quarantined().map(|f| (object.id(), f)))
+        });
+        quarantined.sort_unstable_by_key(|&(id, _)| id);
+        quarantined
+    }
+
+    /// The hash over the state of all objects.
+    #[must_use]
+    pub fn state_hash(&self) -> u64 {
+        state_hash(&*self.executor)
+    }
+
+    /// What each worker spent its time on.
+    #[must_use]
+    pub fn stage_seconds(&self) -> Vec<StageSeconds> {
+        self.executor.stage_seconds()
+    }
+}

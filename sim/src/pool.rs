@@ -1,0 +1,198 @@
+//! The thread pool of the pipeline (§6.1): how many workers there are, and how they sleep.
+
+use std::num::NonZero;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use dualframe_core::environment::Environment;
+use dualframe_core::probe::Probe;
+use dualframe_core::wait::{Bell, Epoch, Waiting};
+use dualframe_core::worker::Worker;
+
+use crate::executor::MAX_THREADS;
+
+/// How long a worker without work looks for some before it sleeps. Usually 50 µs: about what it
+/// costs to put a thread to sleep and to wake it again.
+const SPIN: Duration = Duration::from_micros(50);
+
+/// The number of cores that this process may use.
+#[must_use]
+pub fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, NonZero::get)
+}
+
+/// How many workers a pipeline has. It may be changed at any time, from any thread: workers beyond
+/// the number leave after the work unit in hand, further ones join within
+/// [`crate::blocking::FRAMES_PER_BLOCKING`] frames.
+#[derive(Debug)]
+pub struct Pool {
+    threads: AtomicUsize,
+    pinned: bool,
+    cores: usize,
+}
+
+impl Pool {
+    /// A pool of so many threads, the calling one included, 1 to [`MAX_THREADS`]; others are taken
+    /// for the nearest. `pinned` binds each thread but the calling one to a core of its own, where
+    /// the system can.
+    #[must_use]
+    pub fn new(threads: usize, pinned: bool) -> Self {
+        let threads = AtomicUsize::new(threads.clamp(1, MAX_THREADS));
+        Self { threads, pinned, cores: cores() }
+    }
+
+    /// The number of threads asked for.
+    pub fn threads(&self) -> usize {
+        // Relaxed: the number orders nothing; a worker that sees it late leaves late.
+        self.threads.load(Ordering::Relaxed)
+    }
+
+    /// Asks for another number of threads, 1 to [`MAX_THREADS`].
+    pub fn resize(&self, threads: usize) {
+        self.threads.store(threads.clamp(1, MAX_THREADS), Ordering::Relaxed);
+    }
+
+    /// Binds the calling thread, which is worker number `index`, to a core.
+    pub(crate) fn pin(&self, index: usize) {
+        if !self.pinned {
+            return;
+        }
+        // A system that cannot pin, or does not say what cores there are, is as good without.
+        if let Some(cores) = core_affinity::get_core_ids().filter(|cores| !cores.is_empty()) {
+            core_affinity::set_for_current(cores[index % cores.len()]);
+        }
+    }
+
+    /// Looks for a cause to stop waiting, as long as that is cheaper than to sleep. `false` if
+    /// there was none.
+    pub(crate) fn spin(&self, has_cause: impl Fn() -> bool) -> bool {
+        // With fewer cores than threads looking takes the core from somebody who works.
+        if self.threads() > self.cores {
+            return false;
+        }
+        let began = Instant::now();
+        while began.elapsed() < SPIN {
+            if has_cause() {
+                return true;
+            }
+            std::hint::spin_loop();
+        }
+        false
+    }
+}
+
+/// Where workers sleep, and what they wait for between runs.
+#[derive(Debug, Default)]
+pub(crate) struct Crew {
+    holders: Room,
+    others: Room,
+    /// A run failed, or its host panicked: everybody leaves.
+    aborted: AtomicBool,
+    phase: Mutex<Phase>,
+    changed: Condvar,
+    /// `Phase::run`, to look at without the lock.
+    run: AtomicUsize,
+}
+
+#[derive(Debug, Default)]
+struct Room {
+    door: Mutex<()>,
+    bell: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct Phase {
+    /// Counts runs; 0 before the first.
+    run: usize,
+    closed: bool,
+}
+
+/// Nothing behind these locks can be left half done.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Room {
+    fn wake(&self, count: u32) {
+        // Whoever looked at the bell before it was rung is in the condition variable by now.
+        drop(lock(&self.door));
+        if count == 1 { self.bell.notify_one() } else { self.bell.notify_all() }
+    }
+}
+
+impl Crew {
+    /// Starts the next run: wakes the workers that wait for one.
+    pub(crate) fn start(&self) {
+        let mut phase = lock(&self.phase);
+        phase.run += 1;
+        // Release: with the Acquire in `await_run`; the pipeline itself is behind its own lock.
+        self.run.store(phase.run, Ordering::Release);
+        drop(phase);
+        self.changed.notify_all();
+    }
+
+    /// Waits until a run after number `last` starts and returns its number; `None` to leave.
+    pub(crate) fn await_run(&self, last: usize, pool: &Pool, index: usize) -> Option<usize> {
+        let wanted = || index < pool.threads();
+        let started = || self.run.load(Ordering::Acquire) != last;
+        pool.spin(|| started() && wanted());
+        let mut phase = lock(&self.phase);
+        loop {
+            if phase.closed {
+                return None;
+            }
+            if phase.run != last && wanted() {
+                return Some(phase.run);
+            }
+            phase = self.changed.wait(phase).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Sends everybody home.
+    pub(crate) fn close(&self) {
+        lock(&self.phase).closed = true;
+        self.changed.notify_all();
+    }
+
+    /// Makes everybody leave the run under way.
+    pub(crate) fn abort(&self) {
+        // Release: with the Acquire in `is_aborted`.
+        self.aborted.store(true, Ordering::Release);
+        self.holders.wake(u32::MAX);
+        self.others.wake(u32::MAX);
+    }
+
+    pub(crate) fn is_aborted(&self) -> bool {
+        self.aborted.load(Ordering::Acquire)
+    }
+
+    fn room(&self, bell: &Bell) -> &Room {
+        if bell.is_for_holders() { &self.holders } else { &self.others }
+    }
+
+    /// Waits for work, for the end of the run or for an order to leave.
+    pub(crate) fn idle<E: Environment, P: Probe>(
+        &self,
+        pool: &Pool,
+        worker: &Worker<'_, '_, E, &Self, P>,
+    ) {
+        if !pool.spin(|| worker.has_cause_to_wake() || self.is_aborted()) {
+            worker.wait();
+        }
+    }
+}
+
+impl Waiting for Crew {
+    fn sleep(&self, bell: &Bell, seen: Epoch) {
+        let room = self.room(bell);
+        let mut door = lock(&room.door);
+        while !bell.rung_since(seen) && !self.is_aborted() {
+            door = room.bell.wait(door).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    fn wake(&self, bell: &Bell, count: u32) {
+        self.room(bell).wake(count);
+    }
+}

@@ -1,0 +1,160 @@
+//! The program from outside: its report, and what it says to bad input.
+#![forbid(unsafe_code)]
+
+use std::path::Path;
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+use serde_json::Value;
+
+/// The program. Cargo builds binaries only for the tests of their own package, so this builds it
+/// once, by the cargo that runs the tests.
+fn program() -> &'static Path {
+    static PROGRAM: OnceLock<std::path::PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let built = Command::new(env!("CARGO"))
+            .args(["build", "--quiet", "-p", "dualframe-render-wgpu", "--bin", "dualframe"])
+            .args(["--message-format", "json-render-diagnostics"])
+            .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+            .output()
+            .expect("cargo runs");
+        assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+        let messages = String::from_utf8(built.stdout).expect("cargo speaks UTF-8");
+        let parsed = messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+        let executables =
+            parsed.filter_map(|message| message["executable"].as_str().map(Into::into));
+        executables.last().expect("cargo names the executable")
+    })
+}
+
+fn run(args: &[&str]) -> Output {
+    Command::new(program()).args(args).output().expect("the program starts")
+}
+
+fn report(args: &[&str]) -> Value {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("report.json");
+    let json = file.to_str().expect("a plain path");
+    let output = run(&[args, &["--json", json]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = std::fs::read_to_string(&file).expect("the report was written");
+    serde_json::from_str(&text).expect("the report is JSON")
+}
+
+/// Exit status 2, one line on standard error that holds `part`, nothing on standard output.
+fn refused(args: &[&str], part: &str) {
+    let output = run(args);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{args:?}: {told}");
+    assert_eq!(told.lines().count(), 1, "{args:?}: {told}");
+    assert!(told.contains(part), "{args:?}: {told}");
+    assert!(output.stdout.is_empty(), "{args:?} did some work");
+}
+
+#[test]
+fn report_has_every_key() {
+    let report = report(&["particles", "--objects", "40", "--frames", "50", "--threads", "2"]);
+    let keys = [
+        "scene",
+        "executor",
+        "threads",
+        "objects",
+        "nodes",
+        "springs",
+        "frames",
+        "seed",
+        "seconds",
+        "fps",
+        "frame_ms",
+        "candidates",
+        "collisions",
+        "state_hash",
+        "allocations",
+        "stage_seconds",
+        "quarantined",
+        "non_finite",
+    ];
+    for key in keys {
+        assert!(!report[key].is_null(), "{key}");
+    }
+    for key in ["p50", "p99", "p999", "max"] {
+        assert!(report["frame_ms"][key].as_f64().is_some_and(|time| time > 0.0), "{key}");
+    }
+    let workers = report["stage_seconds"].as_array().expect("one for each worker");
+    assert_eq!(workers.len(), 2);
+    for key in ["broad_phase", "interaction", "update", "render", "idle"] {
+        assert!(workers[0][key].is_number(), "{key}");
+    }
+    assert_eq!((&report["nodes"], &report["springs"]), (&(40 * 42).into(), &(40 * 162).into()));
+    assert_eq!(report["collisions"].as_array().map(Vec::len), Some(50));
+    assert_eq!(report["state_hash"].as_str().map(str::len), Some(16));
+}
+
+#[test]
+fn no_allocation_once_warm() {
+    for extra in [["--threads", "1"], ["--threads", "3"], ["--broad-phase", "pairwise"]] {
+        let args = [&["--objects", "120", "--frames", "300", "--gravity"][..], &extra].concat();
+        assert_eq!(report(&args)["allocations"], 0, "{extra:?}");
+    }
+}
+
+#[test]
+fn every_executor_says_the_same() {
+    let hash = |executor: &str| {
+        let args = ["--objects", "30", "--frames", "40", "--threads", "2", "--executor", executor];
+        let report = report(&args);
+        assert_eq!(report["executor"], executor);
+        report["state_hash"].as_str().map(str::to_owned)
+    };
+    let first = hash("pipeline");
+    for executor in ["serial", "static", "rayon", "rayon-overlapped"] {
+        assert_eq!(hash(executor), first, "{executor}");
+    }
+}
+
+#[test]
+fn bad_arguments() {
+    refused(&["--objects", "0"], "--objects");
+    refused(&["--objects", "banana"], "banana");
+    refused(&["--objects", "-3"], "-3");
+    refused(&["--objects", "99999999999999999999999"], "--objects");
+    refused(&["--objects", "99995"], "99994");
+    refused(&["--objects", "4091", "--broad-phase", "pairwise"], "4090");
+    refused(&["--threads", "0"], "--threads");
+    refused(&["--threads", "257"], "256");
+    refused(&["--frames", "0"], "--frames");
+    refused(&["--frames-in-flight", "3"], "--frames-in-flight");
+    refused(&["--executor", "magic"], "magic");
+    refused(&["--nonsense"], "--nonsense");
+    refused(&["nonsense"], "nonsense");
+    refused(&["--window", "--headless"], "--window");
+    refused(&["--json", "/no/such/folder/report.json"], "/no/such/folder/report.json");
+}
+
+#[test]
+fn pictures_are_not_there_yet() {
+    for args in [&["--window"][..], &["--offscreen"], &["--picture", "picture.png"]] {
+        refused(args, "not there yet");
+    }
+}
+
+#[test]
+fn help_states_the_limits() {
+    let output = run(&["--help"]);
+    let help = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success());
+    for limit in ["99994", "256", "10000000", "4090"] {
+        assert!(help.contains(limit), "{limit} in {help}");
+    }
+}
+
+#[test]
+fn a_closed_pipe_is_no_panic() {
+    let mut child = Command::new(program())
+        .args(["--objects", "5", "--frames", "5"])
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    drop(child.stdout.take());
+    assert!(child.wait().expect("it ends").success());
+}
