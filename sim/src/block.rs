@@ -16,6 +16,15 @@ pub struct Block {
 }
 
 impl Block {
+    /// A block of these objects.
+    #[must_use]
+    pub fn new(mut objects: Vec<Object>) -> Self {
+        objects.sort_unstable_by_key(Object::id);
+        let mut block = Self { objects, ..Self::default() };
+        block.refresh();
+        block
+    }
+
     /// The objects.
     #[must_use]
     pub fn objects(&self) -> &[Object] {

@@ -284,6 +284,10 @@ impl Executor for StaticExecutor {
 impl Drop for StaticExecutor {
     fn drop(&mut self) {
         self.shared.stop.store(true, Ordering::Relaxed);
+        if std::thread::panicking() {
+            // The frame may have been broken off anywhere; waiting for the others might never end.
+            return;
+        }
         self.shared.barrier.wait();
         for thread in self.threads.drain(..) {
             // A thread ends by panic only through a fault of the executor's own; there is nobody to

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-/// An axis-aligned bounding box, in metres. The bounds may be infinite (a half-space's box is).
+/// An axis-aligned bounding box, in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// The least coordinates, in metres.
@@ -15,8 +15,9 @@ impl Bounds {
     /// The box of nothing: it overlaps no box, and is the neutral element of [`Bounds::union`].
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// The box of all space.
-    pub const ALL: Self = Self { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
+    /// The box of all space. Its bounds are the greatest finite numbers: infinite ones would overlap
+    /// the empty box's.
+    pub const ALL: Self = Self { min: Vec3::MIN, max: Vec3::MAX };
 
     /// Whether the two boxes share a point. Never so for an empty box or one with a NaN.
     #[must_use]
@@ -40,19 +41,13 @@ impl Bounds {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// The points that both boxes share; empty where they share none.
-    #[must_use]
-    pub fn intersection(&self, other: &Self) -> Self {
-        Self { min: self.min.max(other.min), max: self.max.min(other.max) }
-    }
-
     /// This box grown by `margin` metres on every side.
     #[must_use]
     pub fn inflated(&self, margin: f32) -> Self {
         Self { min: self.min - Vec3::splat(margin), max: self.max + Vec3::splat(margin) }
     }
 
-    /// The box's middle, in metres. Not finite for an empty or an unbounded box.
+    /// The box's middle, in metres. Not finite for an empty box.
     #[must_use]
     pub fn center(&self) -> Vec3 {
         (self.min + self.max) * 0.5
@@ -62,5 +57,26 @@ impl Bounds {
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.min.is_finite() && self.max.is_finite()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_overlaps_the_empty_box() {
+        for bounds in [Bounds::ALL, Bounds::EMPTY, Bounds { min: Vec3::ZERO, max: Vec3::ONE }] {
+            assert!(!bounds.overlaps(&Bounds::EMPTY) && !Bounds::EMPTY.overlaps(&bounds));
+            assert_eq!(bounds.union(&Bounds::EMPTY), bounds);
+        }
+    }
+
+    #[test]
+    fn touching_boxes_overlap() {
+        let unit = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+        let moved = |by: f32| Bounds { min: Vec3::X * by, max: Vec3::ONE + Vec3::X * by };
+        assert!(unit.overlaps(&moved(1.0)) && unit.overlaps(&unit) && unit.overlaps(&Bounds::ALL));
+        assert!(!unit.overlaps(&moved(1.001)) && !moved(1.001).overlaps(&unit));
     }
 }

@@ -1,0 +1,148 @@
+//! What the tests share.
+
+// Every test binary compiles all of it and uses some.
+#![allow(dead_code)]
+
+use std::sync::Arc;
+
+use dualframe_sim::behavior::{Behavior, Input, MassSpring};
+use dualframe_sim::block::Block;
+use dualframe_sim::blocking::Grain;
+use dualframe_sim::executor::{
+    Executor, RayonExecutor, RayonOverlappedExecutor, SerialExecutor, StaticExecutor, state_hash,
+};
+use dualframe_sim::geometry::{Geometry, Mesh, Topology};
+use dualframe_sim::interaction::{ContactBuffer, Rules, Scratch};
+use dualframe_sim::object::{Group, Object, ObjectId};
+use dualframe_sim::render::NullRenderer;
+use dualframe_sim::scene::{ParticleScene, Scene};
+use dualframe_sim::stages::{PairCount, Stages};
+use dualframe_sim::state::StateHash;
+use glam::Vec3;
+
+/// A particle scene, or the test ends.
+pub(crate) fn particles(objects: usize, gravity: bool, damping: bool) -> Scene {
+    let scene = ParticleScene { objects, seed: 1, gravity, damping };
+    scene.build().expect("the number of particles is allowed")
+}
+
+/// Every executor for a scene, with a name.
+pub(crate) fn executors(
+    scene: impl Fn() -> Scene,
+    grain: Grain,
+    threads: usize,
+) -> Vec<(&'static str, Box<dyn Executor>)> {
+    let ok = "the scene and the number of threads are allowed";
+    vec![
+        ("serial", Box::new(SerialExecutor::new(scene(), grain).expect(ok))),
+        ("static", Box::new(StaticExecutor::new(scene(), grain, threads).expect(ok))),
+        ("rayon", Box::new(RayonExecutor::new(scene(), grain, threads).expect(ok))),
+        ("overlapped", Box::new(RayonOverlappedExecutor::new(scene(), grain, threads).expect(ok))),
+    ]
+}
+
+/// Advances an executor; the counts of its frames, its state and what was drawn.
+pub(crate) fn run(executor: &mut dyn Executor, frames: u64) -> (Vec<PairCount>, u64, NullRenderer) {
+    let (mut counts, mut renderer) = (Vec::new(), NullRenderer::new());
+    let first = executor.frame();
+    let done = executor.advance(frames, &mut renderer, &mut |record| {
+        assert_eq!(record.frame, first + counts.len() as u64, "frames swap in order");
+        counts.push(record.pairs);
+    });
+    done.expect("no table is full");
+    (counts, state_hash(executor), renderer)
+}
+
+/// A serial run of a scene.
+pub(crate) fn serial(scene: Scene) -> SerialExecutor {
+    SerialExecutor::new(scene, Grain::Spatial).expect("the scene is well formed")
+}
+
+/// The state of all objects but one.
+pub(crate) fn hash_without(executor: &dyn Executor, without: ObjectId) -> u64 {
+    let mut hash = StateHash::default();
+    executor.visit(&mut |object| {
+        if object.id() != without {
+            hash.add(object);
+        }
+    });
+    hash.finish()
+}
+
+/// The simplest driver: blocks of `size` objects by number, every pair of blocks in descending order,
+/// results handed over in descending order too. No messages.
+pub(crate) struct Reference {
+    pub(crate) stages: Stages,
+    pub(crate) blocks: Vec<Block>,
+    frame: u64,
+}
+
+impl Reference {
+    pub(crate) fn new(scene: Scene, size: usize) -> Self {
+        let mut blocks = Vec::new();
+        let mut objects = scene.objects.into_iter().peekable();
+        while objects.peek().is_some() {
+            blocks.push(Block::new(objects.by_ref().take(size).collect()));
+        }
+        Self { stages: scene.stages, blocks, frame: 0 }
+    }
+
+    pub(crate) fn step(&mut self) -> PairCount {
+        let mut scratch = Scratch::new();
+        let (mut buffer, mut count) = (ContactBuffer::default(), PairCount::default());
+        for first in (0..self.blocks.len()).rev() {
+            let a = &self.blocks[first];
+            for b in self.blocks[..first].iter().rev() {
+                count += self.stages.interact(a, b, &mut scratch, &mut buffer).expect("grows");
+            }
+            count += self.stages.interact_within(a, &mut scratch, &mut buffer).expect("grows");
+        }
+        let segments: Vec<_> = buffer.segments().collect();
+        for block in &mut self.blocks {
+            segments.iter().rev().for_each(|segment| block.receive(segment));
+            self.stages.update(self.frame, block, std::iter::empty(), &mut |_, _, _| {});
+        }
+        self.frame += 1;
+        count
+    }
+
+    pub(crate) fn hash(&self) -> u64 {
+        let mut hash = StateHash::default();
+        self.blocks.iter().flat_map(Block::objects).for_each(|object| hash.add(object));
+        hash.finish()
+    }
+}
+
+/// An object of one node of 1 kg at the origin that behaves as given.
+pub(crate) fn point(id: u32, behavior: impl Behavior) -> Object {
+    let topology = Topology::new(&[Vec3::ZERO], Vec::new(), &[], false).expect("one node");
+    let mesh = Mesh::new(Arc::new(topology), &[Vec3::ZERO], &[1.0], 0.1).expect("one mass");
+    Object::new(ObjectId(id), Group(0), Geometry::Mesh(mesh), behavior)
+}
+
+/// A behaviour made of a function.
+pub(crate) struct Acting<F>(pub(crate) F);
+
+impl<F> Behavior for Acting<F>
+where
+    F: FnMut(&mut Geometry, &mut Input<'_>) + Send + Sync + 'static,
+{
+    fn update(&mut self, geometry: &mut Geometry, input: &mut Input<'_>) {
+        (self.0)(geometry, input);
+    }
+}
+
+/// Springs without damping in one step a frame.
+pub(crate) fn springs(stiffness: f32) -> MassSpring {
+    MassSpring::new(stiffness, 0.0, 1).expect("a stiffness")
+}
+
+/// Stages without rules and gravity.
+pub(crate) fn no_rules() -> Stages {
+    Stages {
+        rules: Rules::new(),
+        time_step: 1.0 / 240.0,
+        gravity: Vec3::ZERO,
+        callback_budget: None,
+    }
+}
