@@ -94,8 +94,7 @@ impl Gathered {
     }
 }
 
-/// Bounding boxes in whole lanes. Padding and empty boxes are NaN, which overlaps nothing, not even
-/// the box of a half-space.
+/// Bounding boxes in whole lanes, padded with empty ones.
 #[derive(Default)]
 pub(crate) struct Boxes {
     min: [Vec<Lanes>; 3],
@@ -115,13 +114,11 @@ impl Boxes {
         let (chunk, lane) = (self.len / LANES, self.len % LANES);
         for axis in 0..3 {
             if lane == 0 {
-                self.min[axis].push([f32::NAN; LANES]);
-                self.max[axis].push([f32::NAN; LANES]);
+                self.min[axis].push([f32::INFINITY; LANES]);
+                self.max[axis].push([f32::NEG_INFINITY; LANES]);
             }
-            if !bounds.is_empty() {
-                self.min[axis][chunk][lane] = bounds.min[axis];
-                self.max[axis][chunk][lane] = bounds.max[axis];
-            }
+            self.min[axis][chunk][lane] = bounds.min[axis];
+            self.max[axis][chunk][lane] = bounds.max[axis];
         }
         self.len += 1;
     }
@@ -133,8 +130,7 @@ impl Boxes {
         first: usize,
     ) -> impl Iterator<Item = usize> + use<'_> {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
-        let end = if bounds.is_empty() { 0 } else { self.min[0].len() };
-        (first / LANES..end).flat_map(move |chunk| {
+        (first / LANES..self.min[0].len()).flat_map(move |chunk| {
             let mut hits = [true; LANES];
             for axis in 0..3 {
                 let (low, high) = (&self.min[axis][chunk], &self.max[axis][chunk]);

@@ -22,17 +22,7 @@ impl Bounds {
     /// Whether the two boxes share a point. Never so for an empty box or one with a NaN.
     #[must_use]
     pub fn overlaps(&self, other: &Self) -> bool {
-        // Without the first test an empty box would overlap the box of all space.
-        !self.is_empty()
-            && !other.is_empty()
-            && self.min.cmple(other.max).all()
-            && other.min.cmple(self.max).all()
-    }
-
-    /// Whether the box holds no point.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        !self.min.cmple(self.max).all()
+        self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
 
     /// The smallest box that holds both.
