@@ -11,7 +11,7 @@ use dualframe_core::storage::{InteractionSlot, Memory as Tables, UnitSlot, queue
 use dualframe_core::token::Token;
 use dualframe_core::unit::UnitId;
 use dualframe_core::wait::{Bell, Epoch, Waiting};
-use dualframe_core::worker::Step;
+use dualframe_core::worker::{Step, Worker};
 
 use crate::body::{MOST_LETTERS, MOST_RECORDS, Memory, draw};
 use crate::checker::{Expected, check};
@@ -43,6 +43,7 @@ impl Waiting for Park {
     }
 }
 
+type Hand<'p, 'm, 'c> = Worker<'p, 'm, Host<'c>, Park>;
 type Machine<'m, 'c> = Pipeline<'m, Host<'c>, Park>;
 
 /// What the threads of one segment share.
@@ -220,6 +221,12 @@ impl<'p, 'c> Shop<'p, 'c> {
         pipeline.finished() || self.broken.load(Ordering::SeqCst)
     }
 
+    /// Whether a worker may leave for good: not with the token in hand, nor while one lies about
+    /// that this thread may have put there, for those who sleep would not notice it.
+    fn may_go(&self, worker: &mut Hand<'p, '_, 'c>) -> bool {
+        worker.token().is_none() && self.tokens.lock().expect("no poison").is_empty()
+    }
+
     /// One thread, from joining to leaving. The first one never leaves, so that there is one.
     fn work(&self, pipeline: &'p Machine<'_, 'c>, thread: u32) {
         let _alarm = Alarm(&self.broken);
@@ -229,13 +236,13 @@ impl<'p, 'c> Shop<'p, 'c> {
         while self.steps.load(Ordering::SeqCst) < joins && !self.over(pipeline) {
             std::thread::yield_now();
         }
-        // Whoever leaves for good must not be the one that sleepers rely on.
-        let may_leave = thread != 0 && !self.case.sleep && dice.one_in(3);
+        // The first thread never leaves, so that there is one.
+        let may_leave = thread != 0 && dice.one_in(2);
         let leaves = if may_leave { dice.below(120) } else { u32::MAX };
         let mut worker = pipeline.worker();
         let mut stepped = 0;
-        while stepped < leaves && !self.over(pipeline) {
-            stepped += 1;
+        while !self.over(pipeline) && (stepped < leaves || !self.may_go(&mut worker)) {
+            stepped = stepped.saturating_add(1);
             let step = worker.step(&host);
             if step != Ok(Step::Idle) {
                 self.steps.fetch_add(1, Ordering::SeqCst);
