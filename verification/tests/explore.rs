@@ -25,7 +25,7 @@ explored! {
     token: never_doubled static_once;
     pipeline: spatial_after_update spatial_after_render spatial_after_swap pairwise_after_update
         pairwise_after_render pairwise_after_swap pools_come_round two_tokens solitary_unit letters
-        worker_leaves errors_do_no_harm finished_shows_all;
+        errors_do_no_harm finished_shows_all;
 }
 
 /// No model is left out of the list above.

@@ -27,7 +27,6 @@ pub(crate) const ALL: &[Model] = &[
     ("pipeline::two_tokens", two_tokens),
     ("pipeline::solitary_unit", solitary_unit),
     ("pipeline::letters", letters),
-    ("pipeline::worker_leaves", worker_leaves),
     ("pipeline::errors_do_no_harm", errors_do_no_harm),
     ("pipeline::finished_shows_all", finished_shows_all),
 ];
@@ -106,8 +105,6 @@ pub(crate) struct World {
     journal: Mutex<Vec<Event>>,
     /// Every unit's value after its last update.
     values: Mutex<Vec<u32>>,
-    /// The thread of every update.
-    updaters: Mutex<Vec<loom::thread::ThreadId>>,
 }
 
 /// What the token guards: rendering shares it, swapping has it alone.
@@ -207,7 +204,6 @@ impl Environment for World {
         }
         body.updates += 1;
         lock(&self.values)[unit.index()] = body.value;
-        lock(&self.updaters).push(loom::thread::current().id());
         self.log(Updated(unit.0, frame.0));
         self.outcome()
     }
@@ -274,15 +270,7 @@ pub(crate) fn build_with<W: Waiting + 'static>(
     let config = Config { broad_phase, entry, tokens };
     let pipeline = lend(Pipeline::new(memory, config, waiting).unwrap());
     pipeline.run(setup.frames).unwrap();
-    (
-        pipeline,
-        lend(World {
-            setup,
-            journal: Mutex::default(),
-            values: Mutex::new(vec![0; units]),
-            updaters: Mutex::default(),
-        }),
-    )
+    (pipeline, lend(World { setup, journal: Mutex::default(), values: Mutex::new(vec![0; units]) }))
 }
 
 /// A pipeline whose workers spin where they wait.
@@ -306,13 +294,8 @@ pub(crate) fn step<W: Waiting>(
     }
 }
 
-/// A worker's life: steps until all frames are swapped. Returns the number of its updates.
-pub(crate) fn work<W: Waiting>(
-    pipeline: &'static Piped<W>,
-    world: &World,
-    screen: Option<Screen>,
-) -> u32 {
-    let me = loom::thread::current().id();
+/// A worker's life: steps until all frames are swapped.
+pub(crate) fn work<W: Waiting>(pipeline: &'static Piped<W>, world: &World, screen: Option<Screen>) {
     let mut worker = pipeline.worker();
     if let Some(screen) = screen {
         let Ok(token) = pipeline.token(screen) else { panic!("a token is left") };
@@ -323,7 +306,6 @@ pub(crate) fn work<W: Waiting>(
             loom::thread::yield_now();
         }
     }
-    lock(&world.updaters).iter().filter(|&&updater| updater == me).count() as u32
 }
 
 /// The values that a plain serial loop computes.
@@ -396,20 +378,10 @@ pub(crate) fn verify<W: Waiting>(pipeline: &'static Piped<W>, world: &World) -> 
     journal
 }
 
-/// What the other worker did of the updates, and how far frame 1 overlapped frame 0: its first
-/// test came after frame 0 was swapped, before that, or before unit 0 was even rendered.
-type Outcome = (Share, Overlap);
+/// Who did anything in the window that was explored, and how far frame 1 overlapped frame 0.
+type Outcome = ([bool; 2], Overlap);
 
-/// How much.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Share {
-    Nothing,
-    Something,
-    All,
-}
-use Share::{All, Nothing, Something};
-
-/// How far.
+/// Frame 1's first test came after frame 0 was swapped, before that, or before all was rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Overlap {
     AfterSwap,
@@ -421,48 +393,89 @@ use Overlap::{AfterSwap, BeforeRender, BeforeSwap};
 fn overlap(journal: &[Event]) -> Overlap {
     let at = |event: Event| journal.iter().position(|&logged| logged == event);
     let met = at(Met([0, 1], 1));
-    match (met < at(Swapped(0)), met < at(Rendered(0, 0))) {
+    match (met < at(Swapped(0)), met < at(Rendered(0, 0)).max(at(Rendered(1, 0)))) {
         (false, _) => AfterSwap,
         (true, false) => BeforeSwap,
         (true, true) => BeforeRender,
     }
 }
 
-fn two_workers(name: &str, setup: Setup, bound: usize, expected: Vec<Outcome>) {
-    check(name, Some(bound), 2, expected, move |order| {
+/// A worker that goes from thread to thread.
+type Moving = Worker<'static, 'static, World>;
+
+/// Explores a window of two workers' steps, wherever in the run it lies.
+///
+/// `order / 2` steps are made first, turn by turn; then each worker makes `window` steps in a
+/// thread of its own, and this is what loom explores; then one worker finishes the run. The other
+/// one leaves inside the window, in its own thread, with what it carries; it is the token's holder
+/// or not. Windows are laid everywhere from before the first step to after the last. Without
+/// windows loom spends all its time on the stale hints that an idle worker may read.
+fn two_workers(
+    name: &str,
+    setup: Setup,
+    (bound, window, starts): (usize, u32, usize),
+    overlaps: &[Overlap],
+) {
+    let did = [[false, false], [false, true], [true, false], [true, true]];
+    // A window before or after the overlap may find either worker without work.
+    let alone = did.map(|did| (did, AfterSwap));
+    let both = overlaps.iter().map(|&overlap| ([true, true], overlap));
+    // A solitary unit is one more that the other worker may be busy with meanwhile.
+    let other = overlaps.iter().map(|&overlap| ([false, true], overlap));
+    let other = other.filter(|_| setup.solitary_from < setup.units);
+    let expected: Vec<_> = alone.into_iter().chain(both).chain(other).collect();
+    let body = move |order: usize| -> Outcome {
         let (pipeline, world) = build(setup);
         let screen: Screen = lend(Guarded::new(0));
-        let role = |screen: Option<Screen>| -> Role<u32> {
-            Box::new(move || work(pipeline, world, screen))
+        let hold = |worker: &mut Moving| {
+            if let Ok(token) = pipeline.token(screen) {
+                assert!(worker.hold(token).is_ok());
+            }
         };
-        let second = (setup.tokens > 1).then_some(screen);
-        let updates = together(order, vec![role(Some(screen)), role(second)]);
-        let journal = verify(pipeline, world);
-        let share = match updates[..] {
-            [_, 0] => Nothing,
-            [0, _] => All,
-            _ => Something,
+        let mut workers = [pipeline.worker(), pipeline.worker()];
+        hold(&mut workers[0]);
+        if setup.tokens > 1 {
+            hold(&mut workers[1]);
+        }
+        for turn in 0..order / 2 {
+            step(&mut workers[turn % 2], world);
+        }
+        let role = |mut worker: Moving, leaves: bool| -> Role<(bool, Option<Moving>)> {
+            Box::new(move || {
+                let mut did = false;
+                for _ in 0..window {
+                    did |= step(&mut worker, world) != Step::Idle;
+                }
+                (did, (!leaves).then_some(worker))
+            })
         };
-        (share, overlap(&journal))
-    });
-}
-
-const BOUND: usize = 1;
-
-/// Every share with every overlap.
-fn any(overlaps: &[Overlap]) -> Vec<Outcome> {
-    let shares = [Nothing, Something, All];
-    shares.into_iter().flat_map(|share| overlaps.iter().map(move |&over| (share, over))).collect()
+        let [holder, other] = workers;
+        let holder_leaves = order / 2 % 2 == 1;
+        let parts = together(order, vec![role(holder, holder_leaves), role(other, !holder_leaves)]);
+        let did = [parts[0].0, parts[1].0];
+        let mut left: Vec<_> = parts.into_iter().filter_map(|(_, worker)| worker).collect();
+        if left[0].token().is_none() {
+            hold(&mut left[0]);
+        }
+        let mut idle = 0;
+        while !pipeline.finished() {
+            idle = if step(&mut left[0], world) == Step::Idle { idle + 1 } else { 0 };
+            assert!(idle < 4, "unfinished, and no work to be seen: {:?}", lock(&world.journal));
+        }
+        (did, overlap(&verify(pipeline, world)))
+    };
+    check(name, Some(bound), 2 * starts, expected, body);
 }
 
 fn run(name: &str, broad_phase: BroadPhase, entry: Entry) {
-    // What each entry forbids.
+    // What each entry forbids is not among them. Who renders a unit last also swaps, and does so
+    // before it does anything else: of two units, none is met in between.
     let overlaps = match entry {
         Entry::AfterUpdate => &[AfterSwap, BeforeSwap, BeforeRender][..],
-        Entry::AfterRender => &[AfterSwap, BeforeSwap],
+        Entry::AfterRender => &[AfterSwap],
         Entry::AfterSwap => &[AfterSwap],
     };
-    two_workers(name, Setup { broad_phase, entry, ..Setup::default() }, BOUND, any(overlaps));
+    two_workers(name, Setup { broad_phase, entry, ..Setup::default() }, (3, 3, 20), overlaps);
 }
 
 fn spatial_after_update() {
@@ -489,81 +502,36 @@ fn pairwise_after_swap() {
     run("pipeline::pairwise_after_swap", BroadPhase::Pairwise, Entry::AfterSwap);
 }
 
+const ANY: &[Overlap] = &[AfterSwap, BeforeSwap, BeforeRender];
+
 /// Four frames: the pools of contacts and candidates, sized for two, serve twice.
 fn pools_come_round() {
     let setup = Setup { frames: 4, ..Setup::default() };
-    two_workers(
-        "pipeline::pools_come_round",
-        setup,
-        1,
-        any(&[AfterSwap, BeforeSwap, BeforeRender]),
-    );
+    two_workers("pipeline::pools_come_round", setup, (1, 3, 34), ANY);
 }
 
 /// Both workers hold a token: two render at once, one swaps, no one renders ahead.
 fn two_tokens() {
     let setup = Setup { tokens: 2, ..Setup::default() };
-    two_workers("pipeline::two_tokens", setup, BOUND, any(&[AfterSwap, BeforeSwap, BeforeRender]));
+    two_workers("pipeline::two_tokens", setup, (2, 3, 20), ANY);
 }
 
 /// Two that interact and one that does not.
 fn solitary_unit() {
     let setup = Setup { units: 3, solitary_from: 2, ..Setup::default() };
-    two_workers("pipeline::solitary_unit", setup, 1, any(&[AfterSwap, BeforeSwap, BeforeRender]));
+    two_workers("pipeline::solitary_unit", setup, (1, 3, 22), ANY);
 }
 
 /// What is posted in a frame is in the next frame's update, in the values too.
 fn letters() {
     let setup = Setup { letters: true, ..Setup::default() };
-    two_workers("pipeline::letters", setup, 1, any(&[AfterSwap, BeforeSwap, BeforeRender]));
+    two_workers("pipeline::letters", setup, (1, 3, 20), ANY);
 }
 
 /// Every callback returns an error, after its work: all is as without.
 fn errors_do_no_harm() {
     let setup = Setup { fail: true, ..Setup::default() };
-    two_workers(
-        "pipeline::errors_do_no_harm",
-        setup,
-        1,
-        any(&[AfterSwap, BeforeSwap, BeforeRender]),
-    );
-}
-
-/// A worker leaves after one to four steps, with what it carries; the holder finishes alone. Then
-/// the same with a holder who leaves, and another who takes the token after it.
-fn worker_leaves() {
-    let expected = (1..=4).flat_map(|steps| [(steps, false), (steps, true)]);
-    check("pipeline::worker_leaves", Some(BOUND), 16, expected, |order| {
-        let setup = Setup::default();
-        let (pipeline, world) = build(setup);
-        let screen: Screen = lend(Guarded::new(0));
-        let (steps, holder) = (order / 4 + 1, order / 2 % 2 == 1);
-        let leaver: Role<()> = Box::new(move || {
-            let mut worker = pipeline.worker();
-            if holder && let Ok(token) = pipeline.token(screen) {
-                assert!(worker.hold(token).is_ok());
-            }
-            for _ in 0..steps {
-                step(&mut worker, world);
-            }
-        });
-        let stayer: Role<()> = Box::new(move || {
-            let mut worker = pipeline.worker();
-            while !pipeline.finished() {
-                if worker.token().is_none()
-                    && let Ok(token) = pipeline.token(screen)
-                {
-                    assert!(worker.hold(token).is_ok());
-                }
-                if step(&mut worker, world) == Step::Idle {
-                    loom::thread::yield_now();
-                }
-            }
-        });
-        together(order, vec![leaver, stayer]);
-        verify(pipeline, world);
-        (steps, holder)
-    });
+    two_workers("pipeline::errors_do_no_harm", setup, (1, 3, 20), ANY);
 }
 
 /// Who sees that the pipeline has finished sees all that was rendered: no join in between.
