@@ -180,9 +180,7 @@ fn block_count(objects: usize, workers: usize) -> usize {
 
 impl Key {
     fn new(object: &Object) -> Self {
-        let bounds = object.bounds();
-        let center = if bounds.is_finite() { bounds.center().to_array() } else { [0.0; 3] };
-        Self { center, id: object.id().0 }
+        Self { center: object.center().to_array(), id: object.id().0 }
     }
 }
 

@@ -16,9 +16,14 @@ pub enum Message {
         /// The impulse, in newton seconds.
         impulse: [f32; 3],
     },
-    /// Sets the stiffness of all springs, in newtons per metre; negative or non-finite values are
-    /// ignored.
-    Stiffness(f32),
+    /// Sets the stiffness of a mass–spring body's springs, in newtons per metre; negative or
+    /// non-finite values are ignored.
+    Stiffness {
+        /// Of the springs between nodes.
+        between_nodes: f32,
+        /// Of the springs to the centre.
+        to_center: f32,
+    },
     /// Switches the pull of gravity off (`true`) or on.
     Weightless(bool),
     /// Takes the object out of the environment for good.

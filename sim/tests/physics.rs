@@ -133,3 +133,28 @@ fn momentum_of_free_particles_without_damping() {
 fn momentum_of_free_particles_with_damping() {
     momentum_is_kept(true);
 }
+
+/// Kinetic energy, in joules.
+fn kinetic(executor: &SerialExecutor) -> f64 {
+    let mut energy = 0.0;
+    each_mesh(executor, |mesh| {
+        for (velocity, &mass) in mesh.velocities.iter().zip(mesh.masses()) {
+            energy += 0.5 * f64::from(mass) * velocity.as_dvec3().length_squared();
+        }
+    });
+    energy
+}
+
+#[test]
+fn energy_of_a_closed_room_without_damping_is_bounded() {
+    let mut executor = serial(particles(20, false, false));
+    let before = kinetic(&executor);
+    let mut greatest = 0.0_f64;
+    for _ in 0..100 {
+        run(&mut executor, 40);
+        greatest = greatest.max(kinetic(&executor));
+    }
+    println!("{before} {greatest} {}", kinetic(&executor));
+    assert!(greatest < 1.5 * before, "{greatest} J from {before} J");
+    assert!(kinetic(&executor) > 0.2 * before, "energy is lost");
+}

@@ -3,6 +3,7 @@
 mod fixed;
 mod mass_spring;
 mod scripted;
+mod spring_kernel;
 
 use std::any::Any;
 use std::hash::Hasher;

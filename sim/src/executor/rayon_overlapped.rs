@@ -25,8 +25,7 @@ use crate::stages::{PairCount, draw};
 pub struct RayonOverlappedExecutor {
     engine: Engine,
     pool: ThreadPool,
-    used: SyncSender<Picture>,
-    unused: Receiver<Picture>,
+    pictures: Vec<Picture>,
     running: Duration,
 }
 
@@ -43,14 +42,9 @@ impl RayonOverlappedExecutor {
     /// No or too many threads, objects that cannot be grouped, or a pool that cannot be started.
     pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
         let engine = Engine::new(scene, grain, threads)?;
-        let copy =
-            |block: &Block| Mutex::new(block.objects().iter().map(Object::snapshot).collect());
-        let blocks = &engine.world.blocks;
-        let (used, unused) = sync_channel(PICTURES);
-        for _ in 0..PICTURES {
-            give_back(&used, blocks.iter().map(copy).collect());
-        }
-        Ok(Self { engine, pool: pool(threads)?, used, unused, running: Duration::ZERO })
+        let mut pictures = Vec::with_capacity(PICTURES);
+        pictures.resize_with(PICTURES, || picture(&engine.world.blocks));
+        Ok(Self { engine, pool: pool(threads)?, pictures, running: Duration::ZERO })
     }
 }
 
@@ -62,20 +56,35 @@ impl Executor for RayonOverlappedExecutor {
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<(), ExecutorError> {
         let began = Instant::now();
+        let (used, unused) = sync_channel(PICTURES);
         let (taken_in, taken_out) = sync_channel(PICTURES);
-        let (engine, pool, unused) = (&mut self.engine, &self.pool, &mut self.unused);
+        // One that a panicking renderer held is gone.
+        self.pictures.resize_with(PICTURES, || picture(&self.engine.world.blocks));
+        for picture in self.pictures.drain(..) {
+            give_back(&used, picture);
+        }
+        let (engine, pool) = (&mut self.engine, &self.pool);
         let mut render_time = Duration::ZERO;
-        std::thread::scope(|scope| {
-            scope.spawn(move || pool.install(|| compute(engine, frames, unused, &taken_in)));
-            for Taken { frame, pairs, picture } in &taken_out {
+        let unused = std::thread::scope(|scope| {
+            let work = move || pool.install(|| compute(engine, frames, unused, &taken_in));
+            let computing = scope.spawn(work);
+            // Both ends are dropped if the renderer panics, so that nobody waits for it then.
+            let (used, taken_out) = (used, taken_out);
+            for Taken { frame, pairs, picture } in taken_out {
                 let began = Instant::now();
                 show(&picture, renderer);
                 renderer.swap(frame);
                 render_time += began.elapsed();
                 on_frame(&FrameRecord { frame, swapped: Instant::now(), pairs });
-                give_back(&self.used, picture);
+                give_back(&used, picture);
             }
+            drop(used);
+            computing.join()
         });
+        match unused {
+            Ok(unused) => self.pictures.extend(unused),
+            Err(panic) => std::panic::resume_unwind(panic),
+        }
         self.engine.workers[0].clock.add(Stage::Render, render_time);
         self.running += began.elapsed();
         Ok(())
@@ -105,21 +114,28 @@ struct Taken {
     picture: Picture,
 }
 
+/// Room for a picture of these blocks.
+fn picture(blocks: &[Block]) -> Picture {
+    let copy = |block: &Block| block.objects().iter().map(Object::snapshot).collect();
+    blocks.iter().map(|block| Mutex::new(copy(block))).collect()
+}
+
 /// Computes frames and takes a picture of each, until nobody wants them any more.
 fn compute(
     engine: &mut Engine,
     frames: u64,
-    unused: &mut Receiver<Picture>,
+    unused: Receiver<Picture>,
     taken: &SyncSender<Taken>,
-) {
+) -> Receiver<Picture> {
     for _ in 0..frames {
-        let Ok(picture) = unused.recv() else { return };
+        let Ok(picture) = unused.recv() else { break };
         let frame = engine.frame;
         let pairs = engine.compute(|index, block| copy(block, &picture[index]));
         if taken.send(Taken { frame, pairs, picture }).is_err() {
-            return;
+            break;
         }
     }
+    unused
 }
 
 /// Copies what a renderer sees of a block, whose number of objects never changes.
@@ -139,6 +155,6 @@ fn show(picture: &Picture, renderer: &mut dyn Renderer) {
 }
 
 fn give_back(used: &SyncSender<Picture>, picture: Picture) {
-    // The channel has room for all pictures, and its other end is kept beside this one.
+    // There is room for all pictures; a refusal means that nobody needs them any more.
     let _ = used.send(picture);
 }

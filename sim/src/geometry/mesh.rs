@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::bounds::Bounds;
 use super::topology::Topology;
-use super::vectors::{LANES, Lanes, Vectors};
+use super::vectors::{LANES, Lanes, Vectors, lane_sum};
 
 /// Why a mesh cannot be built.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
@@ -113,6 +113,25 @@ impl Mesh {
         if let Some(&inverse_mass) = self.inverse_masses.as_flattened().get(node) {
             self.velocities.add(node, impulse * inverse_mass);
         }
+    }
+
+    /// Changes the velocities of all nodes by equal shares of an impulse, in newton seconds.
+    pub fn apply_body_impulse(&mut self, impulse: Vec3) {
+        let share = (impulse / self.topology.nodes().max(1) as f32).to_array();
+        for (component, share) in self.velocities.components.iter_mut().zip(share) {
+            for (velocities, inverse_masses) in component.iter_mut().zip(&self.inverse_masses) {
+                for (velocity, inverse_mass) in velocities.iter_mut().zip(inverse_masses) {
+                    *velocity += share * inverse_mass;
+                }
+            }
+        }
+    }
+
+    /// The mean of the nodes' positions, in metres.
+    #[must_use]
+    pub fn center(&self) -> Vec3 {
+        let nodes = self.topology.nodes().max(1) as f32;
+        Vec3::from_array(self.positions.components.each_ref().map(|lanes| lane_sum(lanes) / nodes))
     }
 
     /// The box around the contact spheres of all nodes.

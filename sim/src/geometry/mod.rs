@@ -7,12 +7,15 @@ mod rigid;
 mod topology;
 mod vectors;
 
+use glam::Vec3;
+
 pub use bounds::Bounds;
 pub use icosphere::{ICOSPHERE_EDGES, ICOSPHERE_FACES, ICOSPHERE_NODES, icosphere};
 pub(crate) use mesh::KernelParts;
 pub use mesh::{Mesh, MeshError};
 pub use rigid::Rigid;
 pub use topology::{Spring, Topology, TopologyError, edges};
+pub(crate) use vectors::lane_sum;
 pub use vectors::{LANES, Lanes, Vectors};
 
 /// An object's shape and place.
@@ -56,6 +59,15 @@ impl Geometry {
         match self {
             Self::Rigid(rigid) => Some(rigid),
             Self::Mesh(_) => None,
+        }
+    }
+
+    /// The middle of it, in metres: the mean of a surface's nodes, a rigid shape's origin.
+    #[must_use]
+    pub fn center(&self) -> Vec3 {
+        match self {
+            Self::Mesh(mesh) => mesh.center(),
+            Self::Rigid(rigid) => rigid.pose.translation,
         }
     }
 

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 /// Nodes that the kernels handle at once. Sums over lanes are taken in a fixed order, so this number
 /// is part of what makes results equal on every machine: it never follows the machine's vector width.
-pub const LANES: usize = 8;
+pub const LANES: usize = 4;
 
 /// One component of [`LANES`] consecutive nodes.
 pub type Lanes = [f32; LANES];
@@ -137,4 +137,15 @@ fn range(lanes: &[Lanes], len: usize) -> (f32, f32) {
         low.into_iter().fold(f32::INFINITY, f32::min),
         high.into_iter().fold(f32::NEG_INFINITY, f32::max),
     )
+}
+
+/// The sum of all numbers, lane by lane first. The padding is zero.
+pub(crate) fn lane_sum(lanes: &[Lanes]) -> f32 {
+    let mut sum = [0.0; LANES];
+    for chunk in lanes {
+        for lane in 0..LANES {
+            sum[lane] += chunk[lane];
+        }
+    }
+    sum.iter().sum()
 }

@@ -18,7 +18,8 @@ pub struct Contact {
 }
 
 impl Contact {
-    /// The node number of an impulse on a rigid body as a whole.
+    /// The node number of an impulse on a body as a whole; a deformable one's nodes have equal shares
+    /// of it.
     pub const BODY: u32 = u32::MAX - 1;
     /// The node number that marks a fault: the interaction with `other` panicked. The record carries
     /// no impulse; both objects of the pair are given one, and both are quarantined.

@@ -1,20 +1,31 @@
 //! Detection between two deformable surfaces.
 
+use glam::Vec3;
+
 use super::Detection;
+use super::contact::Contact;
 use super::touches::{NearNodes, Touch, Touches};
 use crate::geometry::{LANES, Lanes};
 use crate::object::Object;
 
 /// Finds the pairs of nodes whose contact spheres overlap. With spheres of about 0.3 of a body's
 /// radius the surface is closed: no node of another body fits between them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct NodeSpheres;
+///
+/// Fast or heavily loaded bodies can still be pressed through each other, and once inside, nodes push
+/// the wrong way. So each body may also have a core, a sphere around the mean of its nodes; cores that
+/// overlap touch as whole bodies.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NodeSpheres {
+    /// The radius of a body's core, in metres; 0 for none.
+    pub core_radius: f32,
+}
 
 impl Detection for NodeSpheres {
     fn detect(&self, first: &Object, second: &Object, touches: &mut Touches) {
         let (Some(a), Some(b)) = (first.geometry.as_mesh(), second.geometry.as_mesh()) else {
             return;
         };
+        self.detect_cores(first.center(), second.center(), touches);
         let (list, [near_a, near_b]) = touches.parts();
         // A node touches only if its sphere reaches the box around the other's spheres; and only
         // those of the other's nodes matter that are in reach of one that does.
@@ -26,6 +37,20 @@ impl Detection for NodeSpheres {
         near_b.select(b, &near_a.bounds().inflated(reach * ROUNDING_MARGIN));
         for (index, &node) in near_a.nodes().iter().enumerate() {
             against_all(near_a.position(index), node, near_b, reach, list);
+        }
+    }
+}
+
+impl NodeSpheres {
+    fn detect_cores(&self, first: Vec3, second: Vec3, touches: &mut Touches) {
+        let reach = 2.0 * self.core_radius;
+        let distance = (first - second).length();
+        if distance < reach {
+            touches.push(Touch {
+                nodes: [Contact::BODY; 2],
+                normal: direction(first.to_array(), second.to_array(), distance),
+                depth: reach - distance,
+            });
         }
     }
 }

@@ -30,6 +30,7 @@ pub struct Penalty {
     stiffness: f32,
     damping: f32,
     friction: f32,
+    body_stiffness: f32,
 }
 
 impl Penalty {
@@ -39,17 +40,28 @@ impl Penalty {
     /// # Errors
     /// A value that is negative or not finite.
     pub fn new(stiffness: f32, damping: f32, friction: f32) -> Result<Self, PenaltyError> {
-        let values =
-            [("the stiffness", stiffness), ("the damping", damping), ("the friction", friction)];
-        match values.into_iter().find(|&(_, value)| !(value >= 0.0 && value.is_finite())) {
-            Some((what, value)) => Err(PenaltyError { what, value }),
-            None => Ok(Self { stiffness, damping, friction }),
-        }
+        check("the stiffness", stiffness)?;
+        check("the damping", damping)?;
+        check("the friction", friction)?;
+        Ok(Self { stiffness, damping, friction, body_stiffness: stiffness })
+    }
+
+    /// The same with another stiffness, in newtons per metre, where two bodies touch as a whole.
+    ///
+    /// # Errors
+    /// A value that is negative or not finite.
+    pub fn with_body_stiffness(mut self, stiffness: f32) -> Result<Self, PenaltyError> {
+        check("the stiffness of bodies", stiffness)?;
+        self.body_stiffness = stiffness;
+        Ok(self)
     }
 
     /// The impulse on the first object of a touch, in newton seconds.
     fn impulse(&self, bodies: [&Object; 2], touch: &Touch, time_step: f32) -> Vec3 {
         let normal = Vec3::from_array(touch.normal);
+        if touch.nodes == [Contact::BODY; 2] {
+            return normal * (self.body_stiffness * touch.depth * time_step);
+        }
         let mut force = self.stiffness * touch.depth;
         if self.damping == 0.0 && self.friction == 0.0 {
             return normal * (force * time_step);
@@ -68,6 +80,10 @@ impl Penalty {
         let drag = (self.friction * force * time_step).min(stopping);
         push - slip * (drag / speed)
     }
+}
+
+fn check(what: &'static str, value: f32) -> Result<(), PenaltyError> {
+    if value >= 0.0 && value.is_finite() { Ok(()) } else { Err(PenaltyError { what, value }) }
 }
 
 impl Response for Penalty {

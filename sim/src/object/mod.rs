@@ -47,6 +47,7 @@ pub struct Object {
     fixed: bool,
     quarantined: Option<Fault>,
     bounds: Bounds,
+    center: Vec3,
     /// What it looks like.
     pub visual: VisualProperties,
     /// How it is drawn.
@@ -73,6 +74,7 @@ impl Object {
             fixed: behavior.is_fixed(),
             quarantined: None,
             bounds: geometry.bounds(),
+            center: geometry.center(),
             visual: VisualProperties::default(),
             drawing: Drawing::default(),
             geometry,
@@ -123,6 +125,12 @@ impl Object {
         self.bounds
     }
 
+    /// The middle of its geometry after its last update, in metres.
+    #[must_use]
+    pub fn center(&self) -> Vec3 {
+        self.center
+    }
+
     /// The box that interactions are to look at: empty for an object that has none.
     pub(crate) fn interaction_bounds(&self) -> Bounds {
         if self.solitary { Bounds::EMPTY } else { self.bounds }
@@ -134,10 +142,19 @@ impl Object {
         self.bounds = Bounds::EMPTY;
     }
 
+    /// Fits box and centre to a geometry that was changed from outside. Within an environment that is
+    /// done after every update.
+    pub fn refit(&mut self) {
+        if self.quarantined.is_none() {
+            self.bounds = self.geometry.bounds();
+            self.center = self.geometry.center();
+        }
+    }
+
     /// Brings the box up to date, or excludes the object if its state is not finite.
     pub(crate) fn refresh(&mut self, frame: u64) {
         if self.geometry.is_finite() {
-            self.bounds = self.geometry.bounds();
+            self.refit();
         } else {
             self.quarantine(Fault { kind: FaultKind::NonFinite, frame });
         }
@@ -153,7 +170,7 @@ impl Object {
             }
             Message::Remove => self.quarantine(Fault { kind: FaultKind::Removed, frame }),
             Message::Custom(custom) => custom.process(self),
-            Message::Stiffness(_) | Message::Weightless(_) => self.behavior.process(message),
+            Message::Stiffness { .. } | Message::Weightless(_) => self.behavior.process(message),
         }
     }
 
@@ -167,6 +184,7 @@ impl Object {
             fixed: true,
             quarantined: self.quarantined,
             bounds: self.bounds,
+            center: self.center,
             visual: self.visual,
             drawing: self.drawing,
             geometry: self.geometry.clone(),
@@ -182,6 +200,7 @@ impl Object {
         snapshot.solitary = self.solitary;
         snapshot.quarantined = self.quarantined;
         snapshot.bounds = self.bounds;
+        snapshot.center = self.center;
         snapshot.visual = self.visual;
         snapshot.drawing = self.drawing;
         match (&self.geometry, &mut snapshot.geometry) {

@@ -25,12 +25,21 @@ const RADIUS: f32 = 0.1;
 const CONTACT_RADIUS: f32 = 0.03;
 /// A node's mass, in kilograms; usually 0.01, which makes a particle weigh as much as foam rubber.
 const NODE_MASS: f32 = 0.01;
-/// A spring's stiffness, in newtons per metre; usually 80. One step a frame is then stable.
-const STIFFNESS: f32 = 80.0;
+/// The stiffness of a spring between two nodes, in newtons per metre; usually 60. One step a frame is
+/// then stable.
+const STIFFNESS: f32 = 60.0;
+/// The stiffness of a spring to the centre, in newtons per metre; usually 300: without a stiff core
+/// particles at the bottom of a pile are pressed flat.
+const CENTER_STIFFNESS: f32 = 300.0;
 /// The damping of a spring, in newton seconds per metre; usually 0.02.
 const DAMPING: f32 = 0.02;
 /// The stiffness of a contact between two nodes, in newtons per metre; usually 120.
 const CONTACT_STIFFNESS: f32 = 120.0;
+/// The radius of a particle's core, in metres; usually 0.1, that of its nodes at rest: cores meet
+/// only when particles are pressed into each other.
+const CORE_RADIUS: f32 = 0.1;
+/// The stiffness of a contact between two cores, in newtons per metre; usually 2000.
+const CORE_STIFFNESS: f32 = 2_000.0;
 /// The damping of a contact between two nodes, in newton seconds per metre; usually 0.05.
 const CONTACT_DAMPING: f32 = 0.05;
 /// The stiffness of a wall against a node, in newtons per metre; usually 200.
@@ -46,9 +55,9 @@ const GRAVITY: f32 = 9.81;
 /// The room's volume for each particle, in cubic metres; usually 0.046: a particle with its contact
 /// spheres fills a fifth of it.
 const VOLUME_PER_PARTICLE: f64 = 0.046;
-/// The distance of neighbours at the start, in metres; usually 0.25, so that contact spheres just
+/// The distance of neighbours at the start, in metres; usually 0.24, at which contact spheres just
 /// overlap.
-const SPACING: f32 = 0.25;
+const SPACING: f32 = 0.24;
 /// The greatest component of a particle's velocity at the start, in metres per second; usually 1.
 const SPEED: f32 = 1.0;
 /// The most substeps a frame, 10 (§7.1.1).
@@ -148,7 +157,8 @@ impl ParticleScene {
             let mut component = || random.symmetric();
             mesh.set_velocity(Vec3::new(component(), component(), component()) * SPEED);
             let substeps = random.up_to(MOST_SUBSTEPS);
-            let behavior = MassSpring::new(STIFFNESS, self.damped(DAMPING), substeps)?;
+            let behavior = MassSpring::new(STIFFNESS, self.damped(DAMPING), substeps)?
+                .with_center_stiffness(CENTER_STIFFNESS)?;
             let id = ObjectId(index as u32);
             let mut object = Object::new(id, PARTICLES, Geometry::Mesh(mesh), behavior);
             object.visual = VisualProperties { color: color(substeps) };
@@ -159,8 +169,10 @@ impl ParticleScene {
 
     fn rules(&self) -> Result<Rules, SceneError> {
         let mut rules = Rules::new();
-        let contact = Penalty::new(CONTACT_STIFFNESS, self.damped(CONTACT_DAMPING), 0.0)?;
-        let (detection, response) = (Box::new(NodeSpheres), Box::new(contact));
+        let contact = Penalty::new(CONTACT_STIFFNESS, self.damped(CONTACT_DAMPING), 0.0)?
+            .with_body_stiffness(CORE_STIFFNESS)?;
+        let (detection, response) =
+            (Box::new(NodeSpheres { core_radius: CORE_RADIUS }), Box::new(contact));
         rules.model(PARTICLES, PARTICLES, InteractionPair { detection, response })?;
         let (damping, friction) = (self.damped(WALL_DAMPING), self.damped(WALL_FRICTION));
         let contact = Penalty::new(WALL_STIFFNESS, damping, friction)?;

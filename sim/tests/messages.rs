@@ -1,0 +1,167 @@
+//! Messages, and objects without interactions.
+
+mod common;
+
+use std::sync::{Arc, Mutex};
+
+use common::{Acting, executors, no_rules, particles, point, run, serial};
+use dualframe_sim::behavior::{Fixed, Input, Keyframe, Scripted};
+use dualframe_sim::blocking::Grain;
+use dualframe_sim::executor::Executor;
+use dualframe_sim::geometry::{Geometry, Rigid};
+use dualframe_sim::message::{Custom, Message};
+use dualframe_sim::object::{Drawing, Group, Object, ObjectId};
+use dualframe_sim::scene::Scene;
+use glam::{Quat, Vec3};
+use parry3d::math::Pose;
+use parry3d::shape::SharedShape;
+
+/// Who was told what in which frame: the receiver, the frame it was posted in, the sender, a number.
+type Log = Arc<Mutex<Vec<(ObjectId, u64, u32, u32)>>>;
+
+#[derive(Debug)]
+struct Note {
+    log: Log,
+    posted: u64,
+    from: u32,
+    number: u32,
+}
+
+impl Custom for Note {
+    fn process(&self, object: &mut Object) {
+        let entry = (object.id(), self.posted, self.from, self.number);
+        self.log.lock().expect("nobody panics").push(entry);
+    }
+}
+
+const RECEIVER: u32 = 3;
+const SENDERS: u32 = 8;
+
+/// Objects that each send three notes to one of them in frame 1, which logs its own update too.
+fn gossip(log: &Log) -> Scene {
+    let talker = |id: u32| {
+        let log = Arc::clone(log);
+        let act = move |_: &mut Geometry, input: &mut Input<'_>| {
+            if id == RECEIVER {
+                let entry = (ObjectId(RECEIVER), input.frame, u32::MAX, 0);
+                log.lock().expect("nobody panics").push(entry);
+            }
+            for number in 0..if input.frame == 1 { 3 } else { 0 } {
+                let note = Note { log: Arc::clone(&log), posted: input.frame, from: id, number };
+                input.post(ObjectId(RECEIVER), Message::Custom(Box::new(note)));
+                input.post(ObjectId(1_000), Message::Remove);
+            }
+        };
+        point(id, Acting(act))
+    };
+    Scene { objects: (0..SENDERS).map(talker).collect(), stages: no_rules() }
+}
+
+#[test]
+fn next_frame_by_sender_and_sequence_before_the_update() {
+    let mut expected: Vec<_> =
+        (0..2).map(|frame| (ObjectId(RECEIVER), frame, u32::MAX, 0)).collect();
+    for from in 0..SENDERS {
+        expected.extend((0..3).map(|number| (ObjectId(RECEIVER), 1, from, number)));
+    }
+    // From outside, posted after frame 1: after all others.
+    expected.push((ObjectId(RECEIVER), 99, 99, 99));
+    expected.extend((2..4).map(|frame| (ObjectId(RECEIVER), frame, u32::MAX, 0)));
+    for grain in [Grain::Spatial, Grain::Pairwise] {
+        for threads in 1..=3 {
+            for index in 0..4 {
+                let log = Log::default();
+                let (name, mut executor) =
+                    executors(|| gossip(&log), grain, threads).swap_remove(index);
+                run(&mut *executor, 2);
+                let note = Note { log: Arc::clone(&log), posted: 99, from: 99, number: 99 };
+                executor.post(ObjectId(RECEIVER), Message::Custom(Box::new(note)));
+                run(&mut *executor, 2);
+                assert_eq!(*log.lock().expect("nobody panics"), expected, "{name}, {threads}");
+            }
+        }
+    }
+}
+
+/// The velocity of the only node of an object, in metres per second.
+fn velocity(executor: &dyn Executor, id: u32) -> Vec3 {
+    let mut velocity = Vec3::NAN;
+    executor.visit(&mut |object| {
+        if object.id() == ObjectId(id) {
+            let mesh = object.geometry.as_mesh().expect("a point is a mesh");
+            velocity = mesh.velocities.get(0).expect("a node");
+        }
+    });
+    velocity
+}
+
+#[test]
+fn impulse_and_weightlessness() {
+    let mut stages = no_rules();
+    stages.gravity = Vec3::NEG_Y * 24.0;
+    let objects = (0..2).map(|id| point(id, common::springs(1.0))).collect();
+    let mut executor = serial(Scene { objects, stages });
+    executor.post(ObjectId(0), Message::Weightless(true));
+    // The node weighs 1 kg.
+    executor.post(ObjectId(0), Message::Impulse { node: 0, impulse: [3.0, 0.0, 0.0] });
+    executor.post(ObjectId(0), Message::Impulse { node: 1, impulse: [9.0, 0.0, 0.0] });
+    run(&mut executor, 10);
+    assert_eq!(velocity(&executor, 0), Vec3::X * 3.0);
+    assert!((velocity(&executor, 1) - Vec3::NEG_Y).length() < 1e-6, "24 m/s² over 10/240 s");
+}
+
+#[test]
+fn stiffness() {
+    let energy_after = |message: Option<Message>| {
+        let mut executor = serial(particles(2, false, true));
+        run(&mut executor, 1);
+        message.into_iter().for_each(|message| executor.post(ObjectId(0), message));
+        run(&mut executor, 20).1
+    };
+    let set = |between_nodes, to_center| Some(Message::Stiffness { between_nodes, to_center });
+    assert_ne!(energy_after(None), energy_after(set(10.0, 20.0)));
+    assert_eq!(energy_after(None), energy_after(set(f32::NAN, -1.0)));
+}
+
+/// A ball on a path through a crowd.
+fn scripted(id: u32) -> Object {
+    let key = |frame, x| Keyframe { frame, position: Vec3::X * x, rotation: Quat::IDENTITY };
+    let path = Scripted::new(vec![key(10, -1.0), key(30, 1.0)]).expect("ascending keyframes");
+    let ball = Rigid::new(SharedShape::ball(0.2), Pose::identity());
+    Object::new(ObjectId(id), Group(0), Geometry::Rigid(ball), path)
+}
+
+#[test]
+fn a_scripted_object_needs_no_interactions() {
+    let expected = run(&mut serial(particles(20, false, true)), 40).0;
+    for grain in [Grain::Spatial, Grain::Pairwise] {
+        let scene = || {
+            let mut scene = particles(20, false, true);
+            scene.objects.push(scripted(26).solitary());
+            scene
+        };
+        for (name, mut executor) in executors(scene, grain, 2) {
+            let mut places = Vec::new();
+            for _ in 0..40 {
+                let (counts, ..) = run(&mut *executor, 1);
+                assert_eq!(counts[0], expected[places.len()], "{name}");
+                executor.visit(&mut |object| {
+                    if object.id() == ObjectId(26) {
+                        places.push(object.center().x);
+                    }
+                });
+            }
+            let at = |frame: usize| (frame.clamp(10, 30) as f32 - 20.0) / 10.0;
+            let error = |(frame, x): (usize, &f32)| (x - at(frame)).abs();
+            assert!(places.iter().enumerate().map(error).all(|error| error < 1e-6), "{name}");
+        }
+    }
+}
+
+#[test]
+fn hidden_objects_are_not_drawn() {
+    let mut objects = vec![point(0, Fixed), point(1, Fixed)];
+    objects[1].drawing = Drawing::Hidden;
+    let (_, _, renderer) = run(&mut serial(Scene { objects, stages: no_rules() }), 5);
+    assert_eq!(renderer.draws(), 5);
+}

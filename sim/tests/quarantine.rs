@@ -1,0 +1,176 @@
+//! Whatever a callback does harms its own object at most.
+
+mod common;
+
+use std::time::{Duration, Instant};
+
+use common::{Acting, executors, hash_without, no_rules, particles, point, run, serial};
+use dualframe_sim::behavior::{Fixed, Input};
+use dualframe_sim::blocking::Grain;
+use dualframe_sim::executor::Executor;
+use dualframe_sim::geometry::Geometry;
+use dualframe_sim::interaction::{
+    Detection, InteractionPair, NodeSpheres, Penalty, Rules, Touches,
+};
+use dualframe_sim::message::Message;
+use dualframe_sim::object::{FaultKind, Group, Object, ObjectId};
+use dualframe_sim::scene::Scene;
+use glam::Vec3;
+
+/// The particle that misbehaves, on its way to the crowd of the others.
+const CULPRIT: ObjectId = ObjectId(29);
+/// When it does: before it touches anybody.
+const FATAL_FRAME: u64 = 7;
+const FRAMES: u64 = 100;
+
+/// Particles without walls; the culprit, apart from the others and flying at them, is itself but for
+/// what `worst` does to it in the fatal frame.
+fn crowd(worst: fn(&mut Geometry)) -> Scene {
+    let mut scene = particles(30, false, true);
+    scene.objects.truncate(30);
+    let culprit = &mut scene.objects[CULPRIT.0 as usize];
+    let mesh = culprit.geometry.as_mesh_mut().expect("a particle is a mesh");
+    let away = Vec3::X * 0.9 - mesh.center();
+    for node in 0..mesh.positions.len() {
+        mesh.positions.add(node, away);
+    }
+    mesh.set_velocity(Vec3::X * -2.0);
+    let mut inner = std::mem::replace(&mut culprit.behavior, Box::new(Fixed));
+    culprit.behavior = Box::new(Acting(move |geometry: &mut Geometry, input: &mut Input<'_>| {
+        inner.update(geometry, input);
+        if input.frame == FATAL_FRAME {
+            worst(geometry);
+        }
+    }));
+    culprit.refit();
+    scene
+}
+
+/// The others' state after a run in which the culprit never interacts.
+fn hash_of_absence() -> u64 {
+    let mut scene = crowd(|_| {});
+    let culprit = scene.objects.pop().expect("the culprit is the last");
+    scene.objects.push(culprit.solitary());
+    let mut executor = serial(scene);
+    run(&mut executor, FRAMES);
+    hash_without(&executor, CULPRIT)
+}
+
+fn quarantined(executor: &dyn Executor) -> Vec<(ObjectId, FaultKind, u64)> {
+    let mut list = Vec::new();
+    executor.visit(&mut |object| {
+        list.extend(object.quarantined().map(|fault| (object.id(), fault.kind, fault.frame)));
+    });
+    list.sort_unstable_by_key(|&(id, ..)| id);
+    list
+}
+
+fn only_the_culprit_goes(worst: fn(&mut Geometry), kind: FaultKind) {
+    let expected = hash_of_absence();
+    for grain in [Grain::Spatial, Grain::Pairwise] {
+        for (name, mut executor) in executors(|| crowd(worst), grain, 2) {
+            let (_, _, renderer) = run(&mut *executor, FRAMES);
+            assert_eq!(quarantined(&*executor), [(CULPRIT, kind, FATAL_FRAME)], "{name}");
+            assert_eq!(hash_without(&*executor, CULPRIT), expected, "{name}");
+            assert_eq!(renderer.draws(), 29 * FRAMES + FATAL_FRAME, "{name}");
+        }
+    }
+}
+
+#[test]
+fn the_culprit_would_have_touched_the_others() {
+    let mut executor = serial(crowd(|_| {}));
+    run(&mut executor, FRAMES);
+    assert_ne!(hash_without(&executor, CULPRIT), hash_of_absence());
+    assert_eq!(quarantined(&executor), []);
+}
+
+#[test]
+fn a_panic() {
+    only_the_culprit_goes(|_| panic!("on purpose"), FaultKind::Panicked);
+}
+
+#[test]
+fn a_nan() {
+    let worst = |geometry: &mut Geometry| {
+        let mesh = geometry.as_mesh_mut().expect("a particle is a mesh");
+        mesh.velocities.set(41, Vec3::new(0.0, f32::NAN, 0.0));
+    };
+    only_the_culprit_goes(worst, FaultKind::NonFinite);
+}
+
+#[test]
+fn an_infinity() {
+    let worst = |geometry: &mut Geometry| {
+        let mesh = geometry.as_mesh_mut().expect("a particle is a mesh");
+        mesh.positions.set(0, Vec3::INFINITY);
+    };
+    only_the_culprit_goes(worst, FaultKind::NonFinite);
+}
+
+#[test]
+fn told_to_leave() {
+    let expected = hash_of_absence();
+    for (name, mut executor) in executors(|| crowd(|_| {}), Grain::Spatial, 2) {
+        run(&mut *executor, FATAL_FRAME);
+        executor.post(CULPRIT, Message::Remove);
+        run(&mut *executor, FRAMES - FATAL_FRAME);
+        let gone = [(CULPRIT, FaultKind::Removed, FATAL_FRAME)];
+        assert_eq!(quarantined(&*executor), gone, "{name}");
+        assert_eq!(hash_without(&*executor, CULPRIT), expected, "{name}");
+    }
+}
+
+#[test]
+fn an_update_over_budget() {
+    let budget = Duration::from_millis(1);
+    let slow = move |_: &mut Geometry, input: &mut Input<'_>| {
+        let began = Instant::now();
+        while input.frame == FATAL_FRAME && began.elapsed() <= budget {
+            std::hint::spin_loop();
+        }
+    };
+    let quarantined_with = |budget| {
+        let mut stages = no_rules();
+        stages.callback_budget = budget;
+        let mut executor = serial(Scene { objects: vec![point(0, Acting(slow))], stages });
+        run(&mut executor, FATAL_FRAME + 1);
+        quarantined(&executor)
+    };
+    // A busy machine may make an earlier update late, so the frame is not part of the claim.
+    let kinds: Vec<FaultKind> =
+        quarantined_with(Some(budget)).iter().map(|entry| entry.1).collect();
+    assert_eq!(kinds, [FaultKind::OverBudget]);
+    assert_eq!(quarantined_with(Some(Duration::from_secs(3_600))), []);
+    assert_eq!(quarantined_with(None), []);
+}
+
+/// Panics for the pair of objects 0 and 1.
+struct Fragile;
+
+impl Detection for Fragile {
+    fn detect(&self, first: &Object, second: &Object, touches: &mut Touches) {
+        assert!((first.id(), second.id()) != (ObjectId(0), ObjectId(1)), "on purpose");
+        NodeSpheres::default().detect(first, second, touches);
+    }
+}
+
+#[test]
+fn a_panic_in_an_interaction_takes_both() {
+    let scene = || {
+        let mut rules = Rules::new();
+        let response = Penalty::new(1.0, 0.0, 0.0).expect("a stiffness");
+        let pair = InteractionPair { detection: Box::new(Fragile), response: Box::new(response) };
+        rules.model(Group(0), Group(0), pair).expect("the first rule");
+        let mut stages = no_rules();
+        stages.rules = rules;
+        Scene { objects: (0..3).map(|id| point(id, common::springs(1.0))).collect(), stages }
+    };
+    for (name, mut executor) in executors(scene, Grain::Spatial, 2) {
+        let (counts, ..) = run(&mut *executor, 2);
+        let both = [0, 1].map(|id| (ObjectId(id), FaultKind::Panicked, 0));
+        assert_eq!(quarantined(&*executor), both, "{name}");
+        let candidates: Vec<u64> = counts.iter().map(|count| count.candidates).collect();
+        assert_eq!(candidates, [3, 0], "{name}");
+    }
+}
