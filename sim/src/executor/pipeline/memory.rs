@@ -81,6 +81,16 @@ impl Tables {
         self.contacts.len() / 2
     }
 
+    /// Makes room for so many letters, and as many again that updates may post.
+    pub(super) fn reserve_letters(&mut self, posted: usize) {
+        let size = self.letters.len().max(2 * posted);
+        if size > self.letters.len() {
+            self.letters.resize_with(size, LetterSlot::new);
+            let queues = queue_slots(self.units.len(), self.interactions.len(), size);
+            self.queues.resize_with(queues, QueueSlot::new);
+        }
+    }
+
     /// Doubles the room for contacts.
     pub(super) fn double_contacts(&mut self) {
         let size = 2 * self.contacts.len();
