@@ -2,6 +2,7 @@
 
 mod common;
 
+use std::any::Any;
 use std::sync::Arc;
 
 use common::{no_rules, particles, run, serial};
@@ -134,10 +135,14 @@ fn momentum_of_free_particles_with_damping() {
     momentum_is_kept(true);
 }
 
-/// Kinetic energy, in joules.
-fn kinetic(executor: &SerialExecutor) -> f64 {
+/// The kinetic and the elastic energy of all bodies, in joules.
+fn energy_of_bodies(executor: &SerialExecutor) -> f64 {
     let mut energy = 0.0;
-    each_mesh(executor, |mesh| {
+    executor.visit(&mut |object| {
+        let Some(mesh) = object.geometry.as_mesh() else { return };
+        let behavior: &dyn Any = &*object.behavior;
+        let springs = behavior.downcast_ref::<MassSpring>().expect("particles are mass–spring");
+        energy += springs.elastic_energy(mesh);
         for (velocity, &mass) in mesh.velocities.iter().zip(mesh.masses()) {
             energy += 0.5 * f64::from(mass) * velocity.as_dvec3().length_squared();
         }
@@ -145,16 +150,45 @@ fn kinetic(executor: &SerialExecutor) -> f64 {
     energy
 }
 
+/// The energy of the particle scene's contacts, in joules.
+fn energy_of_contacts(executor: &SerialExecutor) -> f64 {
+    let (mut meshes, mut walls) = (Vec::new(), Vec::new());
+    executor.visit(&mut |object| match &object.geometry {
+        Geometry::Mesh(mesh) => meshes.push(mesh.clone()),
+        Geometry::Rigid(rigid) => walls.extend(rigid.plane()),
+    });
+    // The scene's stiffnesses and reaches: node and wall, node and node, core and core.
+    let stored = |stiffness: f64, reach: f64, distance: f32| {
+        0.5 * stiffness * (reach - f64::from(distance)).max(0.0).powi(2)
+    };
+    let mut energy = 0.0;
+    for (index, a) in meshes.iter().enumerate() {
+        for node in a.positions.iter() {
+            let to_wall = walls.iter().map(|&(point, normal)| (node - point).dot(normal));
+            energy += to_wall.map(|distance| stored(200.0, 0.03, distance)).sum::<f64>();
+        }
+        for b in &meshes[..index] {
+            energy += stored(2_000.0, 0.2, a.center().distance(b.center()));
+            for node in a.positions.iter().filter(|node| node.distance(b.center()) < 0.3) {
+                let others = b.positions.iter().map(|other| node.distance(other));
+                energy += others.map(|distance| stored(120.0, 0.06, distance)).sum::<f64>();
+            }
+        }
+    }
+    energy
+}
+
 #[test]
 fn energy_of_a_closed_room_without_damping_is_bounded() {
     let mut executor = serial(particles(20, false, false));
-    let before = kinetic(&executor);
-    let mut greatest = 0.0_f64;
-    for _ in 0..100 {
-        run(&mut executor, 40);
-        greatest = greatest.max(kinetic(&executor));
+    let energy =
+        |executor: &SerialExecutor| energy_of_bodies(executor) + energy_of_contacts(executor);
+    let (before, mut collisions) = (energy(&executor), 0);
+    for _ in 0..200 {
+        let (counts, ..) = run(&mut executor, 40);
+        collisions += counts.iter().map(|count| count.collisions).sum::<u64>();
+        let error = energy(&executor) / before - 1.0;
+        assert!(error.abs() < 0.05, "{error} of {before} J");
     }
-    println!("{before} {greatest} {}", kinetic(&executor));
-    assert!(greatest < 1.5 * before, "{greatest} J from {before} J");
-    assert!(kinetic(&executor) > 0.2 * before, "energy is lost");
+    assert!(collisions > 1_000, "{collisions} collisions");
 }

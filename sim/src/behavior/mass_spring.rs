@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::spring_kernel::{Dashpot, Elastic, Forces, drift};
 use super::{Behavior, Input};
-use crate::geometry::Geometry;
+use crate::geometry::{Geometry, Mesh, Spring};
 use crate::interaction::Contact;
 use crate::message::Message;
 
@@ -72,6 +72,25 @@ impl MassSpring {
         check("the stiffness to the centre", stiffness)?;
         self.center_stiffness = stiffness;
         Ok(self)
+    }
+
+    /// The energy stored in the springs of a mesh, in joules: ½ k (l − r)² each.
+    #[must_use]
+    pub fn elastic_energy(&self, mesh: &Mesh) -> f64 {
+        let stored = |stiffness: f32, length: f32, rest: f32| {
+            0.5 * f64::from(stiffness) * f64::from(length - rest).powi(2)
+        };
+        let node = |index: u32| mesh.positions.get(index as usize).unwrap_or(Vec3::ZERO);
+        let springs = mesh.topology().springs().iter();
+        let between = springs.map(|&Spring { nodes: [a, b], rest }| {
+            stored(self.stiffness, (node(a) - node(b)).length(), rest)
+        });
+        let center = mesh.center();
+        let rests = mesh.topology().center_rest().unwrap_or_default();
+        let to_center = mesh.positions.iter().zip(rests).map(|(position, &rest)| {
+            stored(self.center_stiffness, (position - center).length(), rest)
+        });
+        between.sum::<f64>() + to_center.sum::<f64>()
     }
 
     /// The number of substeps a frame.

@@ -1,0 +1,173 @@
+//! Single interactions.
+
+mod common;
+
+use common::{no_rules, point, springs};
+use dualframe_sim::behavior::Scripted;
+use dualframe_sim::behavior::{Fixed, Keyframe};
+use dualframe_sim::block::Block;
+use dualframe_sim::geometry::{Geometry, Rigid};
+use dualframe_sim::interaction::{
+    Contact, ContactBuffer, ContactSink, Detection, InteractionPair, NodeSpheres, NodesInShape,
+    Penalty, Scratch, TableFull,
+};
+use dualframe_sim::object::{Group, Object, ObjectId};
+use dualframe_sim::stages::{PairCount, Stages};
+use glam::{Quat, Vec3};
+use parry3d::math::Pose;
+use parry3d::shape::SharedShape;
+
+const POINTS: Group = Group(0);
+const SHAPES: Group = Group(1);
+
+/// Stages in which groups interact by the detection, with 100 N/m and 1 s a frame.
+fn stages(first: Group, second: Group, detection: impl Detection + 'static) -> Stages {
+    let mut stages = no_rules();
+    stages.time_step = 1.0;
+    let response = Penalty::new(100.0, 0.0, 0.0).expect("a stiffness");
+    let pair = InteractionPair { detection: Box::new(detection), response: Box::new(response) };
+    stages.rules.model(first, second, pair).expect("the first rule");
+    stages
+}
+
+/// A point with a contact sphere of 0.1 m.
+fn point_at(id: u32, position: Vec3) -> Object {
+    let mut object = point(id, springs(1.0));
+    let mesh = object.geometry.as_mesh_mut().expect("a point is a mesh");
+    mesh.positions.set(0, position);
+    object.refit();
+    object
+}
+
+fn tool(id: u32, shape: SharedShape, center: Vec3) -> Object {
+    let still = Keyframe { frame: 0, position: center, rotation: Quat::IDENTITY };
+    let path = Scripted::new(vec![still]).expect("a keyframe");
+    let geometry = Geometry::Rigid(Rigid::new(shape, Pose::from_translation(center)));
+    Object::new(ObjectId(id), SHAPES, geometry, path)
+}
+
+fn interact(stages: &Stages, a: Object, b: Object) -> (Vec<Vec<Contact>>, PairCount) {
+    let (a, b) = (Block::new(vec![a]), Block::new(vec![b]));
+    let mut buffer = ContactBuffer::default();
+    let count = stages.interact(&a, &b, &mut Scratch::new(), &mut buffer).expect("grows");
+    (buffer.segments().map(<[Contact]>::to_vec).collect(), count)
+}
+
+#[track_caller]
+fn assert_impulse(contact: &Contact, object: u32, node: u32, impulse: Vec3) {
+    assert_eq!((contact.object, contact.node), (ObjectId(object), node));
+    let error = (Vec3::from_array(contact.impulse) - impulse).length();
+    assert!(error < 1e-4, "{contact:?}, expected {impulse}");
+}
+
+#[test]
+fn spheres_push_each_other_apart() {
+    let stages = stages(POINTS, POINTS, NodeSpheres::default());
+    for (first, second) in [(0, 1), (1, 0)] {
+        let at = |id: u32| point_at(id, Vec3::X * 0.15 * id as f32);
+        let (segments, count) = interact(&stages, at(first), at(second));
+        assert_eq!(count, PairCount { candidates: 1, collisions: 1 });
+        // 0.05 m deep.
+        assert_impulse(&segments[0][0], 0, 0, Vec3::X * -5.0);
+        assert_impulse(&segments[1][0], 1, 0, Vec3::X * 5.0);
+        assert_eq!(segments.iter().map(Vec::len).sum::<usize>(), 2);
+    }
+}
+
+#[test]
+fn boxes_may_overlap_without_contact() {
+    let stages = stages(POINTS, POINTS, NodeSpheres::default());
+    let (segments, count) =
+        interact(&stages, point_at(0, Vec3::ZERO), point_at(1, Vec3::splat(0.15)));
+    assert_eq!((segments.len(), count), (0, PairCount { candidates: 1, collisions: 0 }));
+    let (segments, count) = interact(&stages, point_at(0, Vec3::ZERO), point_at(1, Vec3::X * 0.25));
+    assert_eq!((segments.len(), count), (0, PairCount::default()));
+}
+
+#[test]
+fn cores_touch_as_whole_bodies() {
+    let stages = stages(POINTS, POINTS, NodeSpheres { core_radius: 0.08 });
+    let (segments, _) = interact(&stages, point_at(0, Vec3::ZERO), point_at(1, Vec3::X * 0.15));
+    assert_impulse(&segments[0][0], 0, Contact::BODY, Vec3::X * -1.0);
+    assert_impulse(&segments[1][0], 1, Contact::BODY, Vec3::X * 1.0);
+}
+
+#[test]
+fn walls_push_and_are_told_nothing() {
+    let stages = stages(POINTS, SHAPES, NodesInShape);
+    for normal in [Vec3::Y, Vec3::new(0.6, 0.8, 0.0)] {
+        let geometry = Geometry::Rigid(Rigid::wall(Vec3::ZERO, normal));
+        let wall = Object::new(ObjectId(0), SHAPES, geometry, Fixed);
+        let (segments, _) = interact(&stages, wall, point_at(1, normal * 0.04));
+        assert_eq!(segments.len(), 1);
+        assert_impulse(&segments[0][0], 1, 0, normal * 6.0);
+    }
+}
+
+#[test]
+fn shapes_are_tested_exactly_and_told_the_sum() {
+    let stages = stages(POINTS, SHAPES, NodesInShape);
+    let cube = || tool(0, SharedShape::cuboid(0.5, 0.5, 0.5), Vec3::ZERO);
+    let cases = [
+        // Outside a face, inside it, and at an edge, where a box test would find more.
+        (Vec3::Y * 0.56, Some(Vec3::Y * 4.0)),
+        (Vec3::Y * 0.48, Some(Vec3::Y * 12.0)),
+        (Vec3::new(0.53, 0.54, 0.0), Some(Vec3::new(3.0, 4.0, 0.0))),
+        (Vec3::new(0.58, 0.58, 0.0), None),
+    ];
+    for (position, expected) in cases {
+        let (segments, count) = interact(&stages, cube(), point_at(1, position));
+        assert_eq!(count.candidates, 1);
+        let Some(impulse) = expected else {
+            assert!(segments.is_empty());
+            continue;
+        };
+        assert_impulse(&segments[0][0], 1, 0, impulse);
+        assert_impulse(&segments[1][0], 0, Contact::BODY, -impulse);
+    }
+}
+
+#[test]
+fn damping_never_pulls_and_friction_only_stops() {
+    let mut stages = stages(POINTS, SHAPES, NodesInShape);
+    let response = Penalty::new(100.0, 50.0, 0.5).expect("positive values");
+    stages.rules = dualframe_sim::interaction::Rules::new();
+    let pair = InteractionPair { detection: Box::new(NodesInShape), response: Box::new(response) };
+    stages.rules.model(POINTS, SHAPES, pair).expect("the first rule");
+    let push = |velocity: Vec3| {
+        let mut object = point_at(1, Vec3::Y * 0.05);
+        object.geometry.as_mesh_mut().expect("a mesh").set_velocity(velocity);
+        let geometry = Geometry::Rigid(Rigid::wall(Vec3::ZERO, Vec3::Y));
+        let wall = Object::new(ObjectId(0), SHAPES, geometry, Fixed);
+        Vec3::from_array(interact(&stages, object, wall).0[0][0].impulse)
+    };
+    // 5 N by depth; 50 N s/m against the speed; half of that sideways, but no more than 1 kg needs.
+    let near = |a: Vec3, b: Vec3| assert!((a - b).length() < 1e-4, "{a} {b}");
+    near(push(Vec3::ZERO), Vec3::Y * 5.0);
+    near(push(Vec3::Y * -0.1), Vec3::Y * 10.0);
+    near(push(Vec3::Y * 1.0), Vec3::ZERO);
+    near(push(Vec3::X * 9.0), Vec3::new(-2.5, 5.0, 0.0));
+    near(push(Vec3::X * 2.0), Vec3::new(-2.0, 5.0, 0.0));
+}
+
+/// A table for one record.
+struct Tiny(usize);
+
+impl ContactSink for Tiny {
+    fn push(&mut self, segment: &[Contact]) -> Result<(), TableFull> {
+        let needed = self.0 + segment.len();
+        if needed > 1 {
+            return Err(TableFull { capacity: 1, needed });
+        }
+        self.0 = needed;
+        Ok(())
+    }
+}
+
+#[test]
+fn a_full_table_is_reported() {
+    let stages = stages(POINTS, POINTS, NodeSpheres::default());
+    let block = Block::new(vec![point_at(0, Vec3::ZERO), point_at(1, Vec3::X * 0.1)]);
+    let result = stages.interact_within(&block, &mut Scratch::new(), &mut Tiny(0));
+    assert_eq!(result, Err(TableFull { capacity: 1, needed: 2 }));
+}
