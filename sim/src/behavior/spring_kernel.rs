@@ -91,14 +91,14 @@ impl<'a> Forces<'a> {
 
     /// Changes the velocities by the forces and gravity (m/s²) over a time (s).
     pub(super) fn kick(&self, parts: &mut KernelParts<'_>, gravity: [f32; 3], time: f32) {
-        for axis in 0..3 {
+        for (axis, gravity) in gravity.into_iter().enumerate() {
             let velocities = parts.velocities.components[axis].iter_mut();
             let masses = parts.masses.iter().zip(parts.inverse_masses);
             let nodes = velocities.zip(self.nodes[axis].iter()).zip(masses);
             for ((velocity, force), (mass, inverse_mass)) in nodes {
                 for lane in 0..LANES {
                     // Gravity as a force, so that it moves neither held nodes nor the padding.
-                    let total = force[lane] + self.shared[axis] + mass[lane] * gravity[axis];
+                    let total = force[lane] + self.shared[axis] + mass[lane] * gravity;
                     velocity[lane] += total * inverse_mass[lane] * time;
                 }
             }
