@@ -52,7 +52,12 @@ fn gossip(log: &Log) -> Scene {
                 input.post(ObjectId(1_000), Message::Remove);
             }
         };
-        point(id, Acting(act))
+        let mut object = point(id, Acting(act));
+        // Higher numbers come first in space, so that blocks do not come in the order of numbers.
+        let mesh = object.geometry.as_mesh_mut().expect("a point is a mesh");
+        mesh.positions.set(0, Vec3::NEG_X * id as f32);
+        object.refit();
+        object
     };
     Scene { objects: (0..SENDERS).map(talker).collect(), stages: no_rules() }
 }

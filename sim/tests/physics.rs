@@ -82,6 +82,41 @@ fn period_converges_at_second_order() {
     assert!((coarse / fine - 4.0).abs() < 0.2, "{coarse} / {fine}");
 }
 
+#[test]
+fn an_irregular_body_at_rest_stays_there() {
+    // A star and a tail: nodes of one to five springs, and two without any.
+    let at = |index: usize| Vec3::new(index as f32, (index * index % 5) as f32, 1.0);
+    let nodes: Vec<Vec3> = (0..9).map(at).collect();
+    let edges = [[0, 1], [0, 2], [0, 3], [0, 4], [0, 5], [5, 6]];
+    let topology = Topology::new(&nodes, Vec::new(), &edges, false).expect("nodes exist");
+    let mesh = Mesh::new(Arc::new(topology), &nodes, &[1.0; 9], 0.0).expect("nine masses");
+    let behavior = MassSpring::new(50.0, 1.0, 3).expect("a stiffness");
+    let object = Object::new(ObjectId(0), Group(0), Geometry::Mesh(mesh), behavior);
+    let mut executor = serial(Scene { objects: vec![object], stages: no_rules() });
+    run(&mut executor, 50);
+    each_mesh(&executor, |mesh| {
+        let ways = mesh.positions.iter().zip(&nodes).map(|(now, then)| now.distance(*then));
+        assert!(ways.fold(0.0, f32::max) < 1e-4);
+    });
+}
+
+#[test]
+fn held_nodes_do_not_move() {
+    let nodes = [Vec3::ZERO, Vec3::X];
+    let topology = Topology::new(&nodes, Vec::new(), &[[0, 1]], false).expect("two nodes");
+    let mesh = Mesh::new(Arc::new(topology), &nodes, &[0.0, 1.0], 0.0).expect("two masses");
+    let behavior = MassSpring::new(50.0, 1.0, 1).expect("a stiffness");
+    let object = Object::new(ObjectId(0), Group(0), Geometry::Mesh(mesh), behavior);
+    let mut stages = no_rules();
+    stages.gravity = Vec3::NEG_Y * 9.81;
+    let mut executor = serial(Scene { objects: vec![object], stages });
+    run(&mut executor, 50);
+    each_mesh(&executor, |mesh| {
+        assert_eq!(mesh.positions.get(0), Some(Vec3::ZERO));
+        assert!(mesh.positions.get(1).expect("a node").y < -0.1);
+    });
+}
+
 /// Linear and angular momentum, and the sums of the magnitudes of their parts.
 fn momentum(executor: &SerialExecutor) -> ([DVec3; 2], [f64; 2]) {
     let (mut sums, mut sizes) = ([DVec3::ZERO; 2], [0.0; 2]);

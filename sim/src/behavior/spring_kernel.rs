@@ -91,15 +91,17 @@ impl<'a> Forces<'a> {
 
     /// Changes the velocities by the forces and gravity (m/s²) over a time (s).
     pub(super) fn kick(&self, parts: &mut KernelParts<'_>, gravity: [f32; 3], time: f32) {
-        for (axis, gravity) in gravity.into_iter().enumerate() {
-            let velocities = parts.velocities.components[axis].iter_mut();
-            let masses = parts.masses.iter().zip(parts.inverse_masses);
-            let nodes = velocities.zip(self.nodes[axis].iter()).zip(masses);
-            for ((velocity, force), (mass, inverse_mass)) in nodes {
+        let shared_and_gravity = self.shared.into_iter().zip(gravity);
+        let components = parts.velocities.components.iter_mut().zip(&self.nodes);
+        for ((velocities, forces), (shared, gravity)) in components.zip(shared_and_gravity) {
+            let len = velocities.len();
+            let (forces, masses) = (&forces[..len], &parts.masses[..len]);
+            let inverse_masses = &parts.inverse_masses[..len];
+            for chunk in 0..len {
                 for lane in 0..LANES {
                     // Gravity as a force, so that it moves neither held nodes nor the padding.
-                    let total = force[lane] + self.shared[axis] + mass[lane] * gravity;
-                    velocity[lane] += total * inverse_mass[lane] * time;
+                    let total = forces[chunk][lane] + shared + masses[chunk][lane] * gravity;
+                    velocities[chunk][lane] += total * inverse_masses[chunk][lane] * time;
                 }
             }
         }
