@@ -175,8 +175,9 @@ sites! {
     LATEST_LEAVE = Release;
     /// Acquire: pairs with `LATEST_LEAVE`.
     LATEST_REUSE = Acquire;
-    /// Acquire and Release: hands a static out exactly once.
-    STATIC_TAKE = AcqRel;
+    /// Relaxed: one exchange succeeds, ever, and nothing was written before it that whoever has the
+    /// reference does not see already.
+    STATIC_TAKE = Relaxed;
 }
 
 macro_rules! atomic {
