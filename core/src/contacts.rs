@@ -58,7 +58,6 @@ impl SegmentSlot {
     }
 }
 
-#[cfg(not(loom))]
 impl Default for SegmentSlot {
     fn default() -> Self {
         Self::new()

@@ -25,7 +25,6 @@ impl QueueSlot {
     }
 }
 
-#[cfg(not(loom))]
 impl Default for QueueSlot {
     fn default() -> Self {
         Self::new()
