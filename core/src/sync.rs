@@ -149,9 +149,9 @@ sites! {
     BELL_EPOCH_SEEN = Relaxed;
     /// Relaxed: decides whether to ring, after `FENCE_RING`.
     BELL_SLEEPERS_LOOK = Relaxed;
-    /// Release: orders the pushes before the epoch that announces them.
-    BELL_EPOCH_RING = Release;
-    /// Acquire: pairs with `BELL_EPOCH_RING`.
+    /// Relaxed: `FENCE_RING`, before it, releases the pushes that the new epoch announces.
+    BELL_EPOCH_RING = Relaxed;
+    /// Acquire: pairs with `FENCE_RING` and the `BELL_EPOCH_RING` after it.
     BELL_EPOCH_CHECK = Acquire;
     /// Sequentially consistent fence between announcing and looking again.
     FENCE_SLEEP = SeqCst;
@@ -175,8 +175,9 @@ sites! {
     LATEST_LEAVE = Release;
     /// Acquire: pairs with `LATEST_LEAVE`.
     LATEST_REUSE = Acquire;
-    /// Acquire and Release: hands a static out exactly once.
-    STATIC_TAKE = AcqRel;
+    /// Relaxed: one exchange succeeds, ever, and nothing was written before it that whoever has the
+    /// reference does not see already.
+    STATIC_TAKE = Relaxed;
 }
 
 macro_rules! atomic {
