@@ -80,7 +80,18 @@ pub(crate) struct Gathered {
     pub(crate) workspace: Workspace,
 }
 
+/// Contact records of one object in a dense pile; what is beyond makes the memory grow.
+const RECORDS_PER_OBJECT: usize = 64;
+/// Other objects that an object touches in a dense pile.
+const SEGMENTS_PER_OBJECT: usize = 12;
+
 impl Gathered {
+    /// Makes room for what so many objects are usually given.
+    pub(crate) fn reserve(&mut self, objects: usize) {
+        self.records.reserve(objects * RECORDS_PER_OBJECT);
+        self.segments.reserve(objects * SEGMENTS_PER_OBJECT);
+    }
+
     pub(crate) fn clear(&mut self) {
         self.records.clear();
         self.segments.clear();

@@ -129,6 +129,10 @@ impl Blocking {
         blocking.split();
         for (index, block) in blocks.iter_mut().enumerate() {
             blocking.fill(index, block);
+            // Scenery is told of no contacts, solitary objects have none.
+            if index < moving_blocks {
+                block.gathered.reserve(block.objects.len());
+            }
         }
         (blocking, blocks)
     }
