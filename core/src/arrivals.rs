@@ -24,7 +24,6 @@ impl Arrival {
     }
 }
 
-#[cfg(not(loom))]
 impl Default for Arrival {
     fn default() -> Self {
         Self::new()
@@ -77,7 +76,6 @@ impl Arrivals {
     }
 }
 
-#[cfg(not(loom))]
 impl Default for Arrivals {
     fn default() -> Self {
         Self::new()

@@ -58,32 +58,48 @@ impl SegmentSlot {
     }
 }
 
-#[cfg(not(loom))]
 impl Default for SegmentSlot {
     fn default() -> Self {
         Self::new()
     }
 }
 
-/// Claims `count` of a table's slots, or none: exactly, so that a refused claim costs no room and
-/// no number of refusals can make the counter wrap.
-#[inline]
-pub(crate) fn claim(
-    used: &Atomic,
-    count: u32,
-    capacity: u32,
-    table: Table,
-) -> Result<u32, TableFull> {
-    let mut start = used.load(site::POOL_CLAIM);
-    loop {
-        let needed = start as usize + count as usize;
-        if needed > capacity as usize {
-            return Err(TableFull { table, capacity: capacity as usize, needed });
+/// How much of a frame's table is taken, and how much more was asked for.
+#[derive(Debug)]
+pub(crate) struct Room {
+    used: CachePadded<Atomic>,
+    /// Slots that were asked for in vain. It only serves to name the capacity needed.
+    refused: Atomic,
+}
+
+impl Room {
+    pub(crate) fn new() -> Self {
+        Self { used: CachePadded::new(Atomic::new(0)), refused: Atomic::new(0) }
+    }
+
+    pub(crate) fn reset(&self) {
+        self.used.store(0, site::POOL_RESET);
+        self.refused.store(0, site::POOL_RESET);
+    }
+
+    /// Slots taken so far.
+    pub(crate) fn used(&self) -> u32 {
+        self.used.load(site::POOL_CLAIM)
+    }
+
+    /// Claims `count` slots, or none: exactly, so that a refused claim costs no room and no number
+    /// of refusals can make the counter wrap.
+    #[inline]
+    pub(crate) fn claim(&self, count: u32, capacity: u32, table: Table) -> Result<u32, TableFull> {
+        let mut start = self.used();
+        while start as usize + count as usize <= capacity as usize {
+            match self.used.exchange(start, start + count, site::POOL_CLAIM) {
+                Ok(_) => return Ok(start),
+                Err(found) => start = found,
+            }
         }
-        match used.exchange(start, start + count, site::POOL_CLAIM) {
-            Ok(_) => return Ok(start),
-            Err(found) => start = found,
-        }
+        let refused = self.refused.fetch_add(count, site::POOL_CLAIM) as usize + count as usize;
+        Err(TableFull { table, capacity: capacity as usize, needed: start as usize + refused })
     }
 }
 
@@ -92,32 +108,32 @@ pub(crate) fn claim(
 pub(crate) struct Pools<'m, C> {
     contacts: &'m [ContactSlot<C>],
     segments: &'m [SegmentSlot],
-    used: [CachePadded<Atomic>; 2],
+    rooms: [Room; 2],
     /// Slots of one frame.
     half: u32,
 }
 
 impl<'m, C: Copy> Pools<'m, C> {
     pub(crate) fn new(contacts: &'m [ContactSlot<C>], segments: &'m [SegmentSlot]) -> Self {
-        let used = [0, 1].map(|_| CachePadded::new(Atomic::new(0)));
-        Self { contacts, segments, used, half: (contacts.len() / 2) as u32 }
+        let rooms = [Room::new(), Room::new()];
+        Self { contacts, segments, rooms, half: (contacts.len() / 2) as u32 }
     }
 
     /// Empties `frame`'s pool.
     pub(crate) fn reset(&self, frame: Frame) {
-        self.used[frame.parity()].store(0, site::POOL_RESET);
+        self.rooms[frame.parity()].reset();
     }
 
     /// Slots that `frame` has claimed so far.
     pub(crate) fn used(&self, frame: Frame) -> u32 {
-        self.used[frame.parity()].load(site::POOL_CLAIM)
+        self.rooms[frame.parity()].used()
     }
 
     /// Writes `records` and returns the index of their segment.
     fn push(&self, frame: Frame, records: &[C]) -> Result<u32, TableFull> {
         // A longer slice cannot fit either, and is named by the length that does not.
         let length = u32::try_from(records.len()).unwrap_or(u32::MAX);
-        let claimed = claim(&self.used[frame.parity()], length, self.half, Table::Contacts)?;
+        let claimed = self.rooms[frame.parity()].claim(length, self.half, Table::Contacts)?;
         let start = claimed + frame.parity() as u32 * self.half;
         let room = &self.contacts[start as usize..start as usize + records.len()];
         // SAFETY: `claim` gave this range to this call alone, until `reset`, which happens after

@@ -44,7 +44,8 @@ pub struct TableFull {
     pub table: Table,
     /// What it holds.
     pub capacity: usize,
-    /// What it would have had to hold, as far as is known now; at least this much is needed.
+    /// What it would have had to hold for all that was asked of it so far in this frame; the last
+    /// such error of a frame names the capacity needed.
     pub needed: usize,
 }
 

@@ -41,7 +41,6 @@ impl<M> LetterSlot<M> {
     }
 }
 
-#[cfg(not(loom))]
 impl<M> Default for LetterSlot<M> {
     fn default() -> Self {
         Self::new()
@@ -79,7 +78,6 @@ impl Inbox {
     }
 }
 
-#[cfg(not(loom))]
 impl Default for Inbox {
     fn default() -> Self {
         Self::new()

@@ -117,10 +117,19 @@ impl<'c, T: Copy + Send + Sync, const SLOTS: usize> Readers<'c, T, SLOTS> {
     /// [`TableFull`] if `SLOTS - 2` readers exist.
     pub fn reader(&self) -> Result<Reader<'c, T, SLOTS>, TableFull> {
         let capacity = SLOTS - 2;
-        let before = self.cell.readers.fetch_add(1, site::TOKEN_COUNT) as usize;
-        if before >= capacity {
-            self.cell.readers.fetch_sub(1, site::TOKEN_COUNT);
-            return Err(TableFull { table: Table::Readers, capacity, needed: before + 1 });
+        let readers = &self.cell.readers;
+        let mut count = readers.load(site::EXCLUSIVE);
+        loop {
+            // A refused claim leaves no trace: counting it and taking it back would meanwhile
+            // refuse others who have room.
+            if count as usize >= capacity {
+                let needed = count as usize + 1;
+                return Err(TableFull { table: Table::Readers, capacity, needed });
+            }
+            match readers.exchange(count, count + 1, site::READERS_COUNT) {
+                Ok(_) => break,
+                Err(found) => count = found,
+            }
         }
         Ok(Reader { cell: self.cell, inside: self.cell.enter() })
     }
@@ -149,6 +158,6 @@ impl<T: Copy + Send + Sync, const SLOTS: usize> Reader<'_, T, SLOTS> {
 impl<T: Copy + Send + Sync, const SLOTS: usize> Drop for Reader<'_, T, SLOTS> {
     fn drop(&mut self) {
         self.cell.leave(self.inside);
-        self.cell.readers.fetch_sub(1, site::TOKEN_COUNT);
+        self.cell.readers.fetch_sub(1, site::READERS_COUNT);
     }
 }

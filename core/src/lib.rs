@@ -56,6 +56,7 @@ mod list;
 pub mod migrate;
 pub mod pipeline;
 pub mod probe;
+mod protocol;
 pub mod ring;
 pub mod stage;
 pub mod storage;

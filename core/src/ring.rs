@@ -25,7 +25,6 @@ impl QueueSlot {
     }
 }
 
-#[cfg(not(loom))]
 impl Default for QueueSlot {
     fn default() -> Self {
         Self::new()
@@ -123,7 +122,8 @@ impl<'m> IndexRing<'m> {
         let _ = self.tail.exchange(tail, tail.wrapping_add(1), site::RING_TAIL_HELP);
     }
 
-    /// Takes the oldest index; `None` when the ring was empty at some moment of the call.
+    /// Takes the oldest index; `None` when every push that happened before the call is popped. One
+    /// that is under way meanwhile may be missed.
     #[inline]
     pub fn pop(&self) -> Option<u32> {
         loop {

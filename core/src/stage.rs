@@ -47,6 +47,13 @@ impl Stages {
         Self(self.0 | u8::from(condition) << stage as u8)
     }
 
+    /// This set less `stage`.
+    #[inline]
+    #[must_use]
+    pub fn without(self, stage: Stage) -> Self {
+        Self(self.0 & !(1 << stage as u8))
+    }
+
     /// Whether `stage` is in the set.
     #[inline]
     pub fn contains(self, stage: Stage) -> bool {

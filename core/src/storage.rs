@@ -26,7 +26,10 @@ pub struct UnitSlot<O> {
     /// First of the modelled interactions.
     pub(crate) modelled: Atomic,
     pub(crate) inbox: Inbox,
+    /// Made so by the host.
     pub(crate) solitary: bool,
+    /// Whether it bypasses the first two stages, in the pipeline at hand.
+    pub(crate) bypasses: bool,
 }
 
 impl<O> UnitSlot<O> {
@@ -42,6 +45,7 @@ impl<O> UnitSlot<O> {
                 modelled: Atomic::new(NONE),
                 inbox: Inbox::new(),
                 solitary: false,
+                bypasses: false,
             }
         }
     }
@@ -195,7 +199,7 @@ impl<T> Static<T> {
     }
 
     /// The value, at the first call.
-    #[expect(clippy::mut_from_ref, reason = "the flag lends it once")]
+    #[expect(clippy::mut_from_ref, reason = "the flag lets one call pass, ever")]
     pub fn take(&'static self) -> Option<&'static mut T> {
         if self.taken.exchange(0, 1, site::STATIC_TAKE).is_err() {
             return None;

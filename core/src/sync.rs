@@ -81,14 +81,15 @@ macro_rules! sites {
 sites! {
     /// Relaxed: the construction and every `&mut` path; exclusive access orders it.
     EXCLUSIVE = Relaxed;
-    /// Relaxed: a hint that is re-validated by the CAS on the cell.
-    RING_TAIL_LOAD = Relaxed;
+    /// Acquire: pairs with `RING_TAIL_HELP`. Whoever sees this push also sees the cells before it,
+    /// and cannot take the ring for empty because an earlier cell still looks unwritten.
+    RING_TAIL_LOAD = Acquire;
     /// Relaxed: re-validated by the CAS that follows.
     RING_CELL_LOOK = Relaxed;
     /// Release: publishes what the pusher wrote about the index to whoever pops it.
     RING_CELL_PUBLISH = Release;
-    /// Relaxed: anyone may help the tail on; it carries no data.
-    RING_TAIL_HELP = Relaxed;
+    /// Release: the cell below the new tail was written, or seen written, before.
+    RING_TAIL_HELP = Release;
     /// Relaxed: a hint that is re-validated by the CAS on the head.
     RING_HEAD_LOAD = Relaxed;
     /// Acquire: pairs with `RING_CELL_PUBLISH`.
@@ -148,16 +149,22 @@ sites! {
     BELL_EPOCH_SEEN = Relaxed;
     /// Relaxed: decides whether to ring, after `FENCE_RING`.
     BELL_SLEEPERS_LOOK = Relaxed;
-    /// Release: orders the pushes before the epoch that announces them.
-    BELL_EPOCH_RING = Release;
-    /// Acquire: pairs with `BELL_EPOCH_RING`.
+    /// Relaxed: `FENCE_RING`, before it, releases the pushes that the new epoch announces.
+    BELL_EPOCH_RING = Relaxed;
+    /// Acquire: pairs with `FENCE_RING` and the `BELL_EPOCH_RING` after it.
     BELL_EPOCH_CHECK = Acquire;
     /// Sequentially consistent fence between announcing and looking again.
     FENCE_SLEEP = SeqCst;
     /// Sequentially consistent fence between pushing and looking for sleepers.
     FENCE_RING = SeqCst;
+    /// Sequentially consistent fence between ceasing to be a sleeper and looking at what is left
+    /// behind.
+    FENCE_LEAVE = SeqCst;
     /// Acquire and Release: the token's renderer moves from holder to holder.
     TOKEN_COUNT = AcqRel;
+    /// Acquire and Release: a new reader enters after the one whose place it takes has left, so
+    /// that the writer, who sees it enter, sees the other's slot free.
+    READERS_COUNT = AcqRel;
     /// Acquire and Release: a reader enters the newest slot; the writer learns who is inside.
     LATEST_ENTER = AcqRel;
     /// Relaxed: only compares indices, to skip `LATEST_ENTER`; the slot was acquired before.
@@ -168,8 +175,9 @@ sites! {
     LATEST_LEAVE = Release;
     /// Acquire: pairs with `LATEST_LEAVE`.
     LATEST_REUSE = Acquire;
-    /// Acquire and Release: hands a static out exactly once.
-    STATIC_TAKE = AcqRel;
+    /// Relaxed: one exchange succeeds, ever, and nothing was written before it that whoever has the
+    /// reference does not see already.
+    STATIC_TAKE = Relaxed;
 }
 
 macro_rules! atomic {

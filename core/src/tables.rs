@@ -1,8 +1,6 @@
 //! The pipeline's tables: units, interactions, results, letters, and the queues between stages.
 
-use crossbeam_utils::CachePadded;
-
-use crate::contacts::{Pools, claim};
+use crate::contacts::{Pools, Room};
 use crate::environment::Environment;
 use crate::error::{SetupError, Table, TableFull};
 use crate::frame::Frame;
@@ -10,7 +8,7 @@ use crate::inbox::Post;
 use crate::list;
 use crate::ring::{IndexRing, QueueSlot, slots_for};
 use crate::storage::{Chain, InteractionSlot, Memory, UnitSlot, queue_slots};
-use crate::sync::{Atomic, site};
+use crate::sync::site;
 use crate::unit::{InteractionId, NONE, UnitId};
 
 /// Queues carry only what nobody has in hand (§4.2).
@@ -31,7 +29,7 @@ pub(crate) struct Tables<'m, E: Environment + ?Sized> {
     pub(crate) post: Post<'m, E::Message>,
     pub(crate) queues: Queues<'m>,
     /// Candidate slots claimed in each frame in flight (spatial broad phase).
-    found: [CachePadded<Atomic>; 2],
+    found: [Room; 2],
 }
 
 /// The largest table whose indices leave room for `NONE` and for doubling.
@@ -64,6 +62,7 @@ impl<'m, E: Environment> Tables<'m, E> {
             unit.inbox = crate::inbox::Inbox::new();
             // No rendering precedes the first update: it waits for the frame's opening only.
             unit.pending.arm(1);
+            unit.bypasses = unit.solitary;
         }
         if modelled {
             link_modelled(units, interactions)?;
@@ -87,7 +86,7 @@ impl<'m, E: Environment> Tables<'m, E> {
             pools: Pools::new(contacts, segments),
             post: Post::new(letters, free),
             queues,
-            found: [0, 1].map(|_| CachePadded::new(Atomic::new(0))),
+            found: [Room::new(), Room::new()],
         })
     }
 }
@@ -112,7 +111,7 @@ fn link_modelled<O, I>(
         }
     }
     for unit in units {
-        unit.solitary = unit.modelled.load(site::EXCLUSIVE) == NONE;
+        unit.bypasses = unit.modelled.load(site::EXCLUSIVE) == NONE;
     }
     Ok(())
 }
@@ -131,18 +130,18 @@ impl<'m, E: Environment + ?Sized> Tables<'m, E> {
     /// A slot for a pair found in `frame`: even frames have the first half of the slots.
     pub(crate) fn claim_candidate(&self, frame: Frame) -> Result<InteractionId, TableFull> {
         let half = (self.interactions.len() / 2) as u32;
-        let claimed = claim(&self.found[frame.parity()], 1, half, Table::Interactions)?;
+        let claimed = self.found[frame.parity()].claim(1, half, Table::Interactions)?;
         Ok(InteractionId(claimed + frame.parity() as u32 * half))
     }
 
     /// Candidate slots that `frame` has claimed so far.
     pub(crate) fn candidates_used(&self, frame: Frame) -> u32 {
-        self.found[frame.parity()].load(site::POOL_CLAIM)
+        self.found[frame.parity()].used()
     }
 
     /// Empties what belonged to the frame before last, of the same parity as `frame`.
     pub(crate) fn reset_pools(&self, frame: Frame) {
-        self.found[frame.parity()].store(0, site::POOL_RESET);
+        self.found[frame.parity()].reset();
         self.pools.reset(frame);
     }
 

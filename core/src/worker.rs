@@ -5,7 +5,8 @@ use crate::error::TableFull;
 use crate::migrate::migrate;
 use crate::pipeline::Pipeline;
 use crate::probe::{NoProbe, Probe};
-use crate::stage::Stage;
+use crate::stage::{Stage, Stages};
+use crate::sync::{fence, site};
 use crate::token::Token;
 use crate::unit::Work;
 use crate::wait::{Spin, Waiting};
@@ -46,6 +47,18 @@ impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
         if let Some(work) = self.work.take() {
             self.queue(work);
         }
+    }
+
+    /// Gives away what is carried, and any call that this worker was woken by and has not
+    /// answered: whoever called counted on it, and may sleep or have left by now.
+    fn leave(&mut self) {
+        self.shed();
+        // Whoever still counts this worker among the sleepers has queued its work before this.
+        fence(site::FENCE_LEAVE);
+        let left = self.pipeline.visible(true);
+        self.renders += u32::from(left.contains(Stage::Render));
+        self.queued += u32::from(left.without(Stage::Render) != Stages::NONE);
+        self.announce();
     }
 
     fn announce(&mut self) {
@@ -120,8 +133,7 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
     /// Takes the token away, to give it to another worker.
     pub fn release(&mut self) -> Option<Token<'p, E::Renderer>> {
         // A carried rendering stays behind for the next holder.
-        self.carry.shed();
-        self.carry.announce();
+        self.carry.leave();
         self.token.take()
     }
 
@@ -211,7 +223,6 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
 
 impl<E: Environment, W: Waiting> Drop for Carry<'_, '_, E, W> {
     fn drop(&mut self) {
-        self.shed();
-        self.announce();
+        self.leave();
     }
 }

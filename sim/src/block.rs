@@ -72,6 +72,12 @@ impl Block {
     }
 }
 
+/// Contact records of one object in one frame for which a block has room from the start; usually 96,
+/// twice what the densest pile has, so that a frame need not allocate.
+pub(crate) const CONTACTS_PER_OBJECT: usize = 96;
+/// Other objects that one object touches at once, likewise; usually 24, twice the densest packing's.
+const TOUCHED_PER_OBJECT: usize = 24;
+
 /// Contacts of this frame's updates, collected from wherever interactions left them.
 #[derive(Default)]
 pub(crate) struct Gathered {
@@ -80,16 +86,11 @@ pub(crate) struct Gathered {
     pub(crate) workspace: Workspace,
 }
 
-/// Contact records of one object in a dense pile; what is beyond makes the memory grow.
-const RECORDS_PER_OBJECT: usize = 64;
-/// Other objects that an object touches in a dense pile.
-const SEGMENTS_PER_OBJECT: usize = 12;
-
 impl Gathered {
-    /// Makes room for what so many objects are usually given.
+    /// Makes room for what so many objects usually have.
     pub(crate) fn reserve(&mut self, objects: usize) {
-        self.records.reserve(objects * RECORDS_PER_OBJECT);
-        self.segments.reserve(objects * SEGMENTS_PER_OBJECT);
+        self.records.reserve(objects * CONTACTS_PER_OBJECT);
+        self.segments.reserve(objects * TOUCHED_PER_OBJECT);
     }
 
     pub(crate) fn clear(&mut self) {

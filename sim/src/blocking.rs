@@ -129,10 +129,6 @@ impl Blocking {
         blocking.split();
         for (index, block) in blocks.iter_mut().enumerate() {
             blocking.fill(index, block);
-            // Scenery is told of no contacts, solitary objects have none.
-            if index < moving_blocks {
-                block.gathered.reserve(block.objects.len());
-            }
         }
         (blocking, blocks)
     }
@@ -161,6 +157,7 @@ impl Blocking {
         for &id in members {
             block.objects.extend(self.objects.get_mut(id as usize).and_then(Option::take));
         }
+        block.gathered.reserve(members.len());
         block.refresh();
     }
 }

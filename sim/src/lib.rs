@@ -5,6 +5,19 @@
 //! have four stages: broad phase, interaction, update and render. The stages themselves are
 //! [`stages::Stages`], work on [`block::Block`]s of objects, and are the same for every executor; so
 //! are the results, bit for bit, whatever the executor, the number of threads and the blocking.
+//!
+//! | paper | module |
+//! |---|---|
+//! | §4.1, Fig. 2: 3D Object (visual properties, geometry, behaviour, renderer) | [`object`], [`geometry`], [`behavior`], [`render`] |
+//! | §4.1, Fig. 3: interaction pair (detection, response, results) | [`interaction`] |
+//! | §5.2, Fig. 7: callbacks | [`stages`] |
+//! | §6.1, Fig. 9: VE Manager | [`manager`] |
+//! | Object Manager: maintains the objects and where they go | [`blocking`], [`block`] |
+//! | Object Interaction Manager: the complete set of interaction pairs | [`interaction::Rules`]; the queues are the core's |
+//! | thread pool | [`pool`] |
+//! | §6.2: messages | [`message`] |
+//! | §7.1.1: particles | [`scene`] |
+//! | §7.2: the pipeline and what it is compared with | [`executor`] |
 
 #![forbid(unsafe_code)]
 

@@ -21,9 +21,9 @@ fn program() -> &'static Path {
         assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
         let messages = String::from_utf8(built.stdout).expect("cargo speaks UTF-8");
         let parsed = messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
-        let executables =
+        let mut executables =
             parsed.filter_map(|message| message["executable"].as_str().map(Into::into));
-        executables.last().expect("cargo names the executable")
+        executables.next_back().expect("cargo names the executable")
     })
 }
 

@@ -1,8 +1,7 @@
 //! Executors: what drives the four stages, frame by frame.
 //!
-//! Every executor calls the same [`Stages`] on the same [`Block`]s and comes to the same bits.
-//!
-//! [`Block`]: crate::block::Block
+//! Every executor calls the same [`Stages`](crate::stages::Stages) on the same
+//! [`Block`](crate::block::Block)s and comes to the same bits.
 
 mod barrier;
 mod clock;

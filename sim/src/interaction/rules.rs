@@ -32,7 +32,8 @@ pub enum RuleError {
     },
 }
 
-/// The modelled interactions. Groups without a rule never interact.
+/// The modelled interactions: the Object Interaction Manager's complete set of pairs (§6.1), said by
+/// groups of objects rather than one by one. Groups without a rule never interact.
 #[derive(Default)]
 pub struct Rules {
     pairs: Vec<(Group, Group, InteractionPair)>,

@@ -17,10 +17,20 @@ pub struct Touch {
 }
 
 /// What a detection found, and the memory it works in.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Touches {
     list: Vec<Touch>,
     pub(super) near: [NearNodes; 2],
+}
+
+/// Touches of one pair for which there is room from the start; usually 2,048, more than two particles
+/// can have, so that a frame need not allocate.
+const ROOM: usize = 2_048;
+
+impl Default for Touches {
+    fn default() -> Self {
+        Self { list: Vec::with_capacity(ROOM), near: Default::default() }
+    }
 }
 
 impl Touches {

@@ -9,11 +9,13 @@ use dualframe_sim::behavior::{Behavior, Input, MassSpring};
 use dualframe_sim::block::Block;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::{
-    Executor, RayonExecutor, RayonOverlappedExecutor, SerialExecutor, StaticExecutor, state_hash,
+    Entry, Executor, PipelineExecutor, RayonExecutor, RayonOverlappedExecutor, SerialExecutor,
+    StaticExecutor, state_hash,
 };
 use dualframe_sim::geometry::{Geometry, Mesh, Topology};
 use dualframe_sim::interaction::{ContactBuffer, Rules, Scratch};
 use dualframe_sim::object::{Group, Object, ObjectId};
+use dualframe_sim::pool::Pool;
 use dualframe_sim::render::NullRenderer;
 use dualframe_sim::scene::{ParticleScene, Scene};
 use dualframe_sim::stages::{PairCount, Stages};
@@ -33,7 +35,14 @@ pub(crate) fn executors(
     threads: usize,
 ) -> Vec<(&'static str, Box<dyn Executor>)> {
     let ok = "the scene and the number of threads are allowed";
+    let pipeline = |entry| {
+        let pool = Arc::new(Pool::new(threads, false));
+        Box::new(PipelineExecutor::new(scene(), grain, entry, pool).expect(ok))
+    };
     vec![
+        ("pipeline", pipeline(Entry::AfterUpdate)),
+        ("pipeline, render first", pipeline(Entry::AfterRender)),
+        ("pipeline, one frame", pipeline(Entry::AfterSwap)),
         ("serial", Box::new(SerialExecutor::new(scene(), grain).expect(ok))),
         ("static", Box::new(StaticExecutor::new(scene(), grain, threads).expect(ok))),
         ("rayon", Box::new(RayonExecutor::new(scene(), grain, threads).expect(ok))),

@@ -8,13 +8,11 @@ use dualframe_core::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
 use dualframe_core::unit::UnitId;
 
 use super::host::Parcel;
-use crate::block::Block;
+use crate::block::{Block, CONTACTS_PER_OBJECT};
 use crate::interaction::Contact;
 use crate::object::Object;
 use crate::stages::Stages;
 
-/// Contact records a frame for each object at first; usually 96, twice what the densest pile has.
-const CONTACTS_PER_OBJECT: usize = 96;
 /// Contact records a frame that there is room for at least, however few the objects.
 const FEWEST_CONTACTS: usize = 4_096;
 /// Letters that may be under way at once: for each object, and at least.
@@ -81,6 +79,16 @@ impl Tables {
     /// Contact records that one frame may have.
     pub(super) fn contact_capacity(&self) -> usize {
         self.contacts.len() / 2
+    }
+
+    /// Makes room for so many letters, and as many again that updates may post.
+    pub(super) fn reserve_letters(&mut self, posted: usize) {
+        let size = self.letters.len().max(2 * posted);
+        if size > self.letters.len() {
+            self.letters.resize_with(size, LetterSlot::new);
+            let queues = queue_slots(self.units.len(), self.interactions.len(), size);
+            self.queues.resize_with(queues, QueueSlot::new);
+        }
     }
 
     /// Doubles the room for contacts.

@@ -91,6 +91,7 @@ impl PipelineExecutor {
         let most_contacts = self.tables.contact_capacity() / 2;
         let shared = Shared::new(&self.stages, self.frame, self.objects);
         self.tables.load(&mut self.blocks);
+        self.tables.reserve_letters(self.mail.len());
         let crew = Crew::default();
         let pipeline = Pipeline::new(self.tables.lend(), self.config, &crew)?;
         let seconds = std::mem::take(&mut self.seconds);

@@ -1,0 +1,247 @@
+//! What each work unit does, and what it sets free.
+//!
+//! One rule throughout: the last arriver at a countdown carries on. `PROTOCOL.md` states who may
+//! write what when, and why.
+
+use crate::arrivals::Arrivals;
+use crate::contacts::Contacts;
+use crate::environment::{Environment, Pair};
+use crate::error::TableFull;
+use crate::frame::{Entry, Frame};
+use crate::inputs::Inputs;
+use crate::pipeline::{BroadPhase, Pipeline};
+use crate::storage::Chain;
+use crate::sync::site;
+use crate::token::Token;
+use crate::unit::{InteractionId, NONE, UnitId, Work};
+use crate::wait::Waiting;
+use crate::worker::Outputs;
+
+impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
+    /// Broad phase: the unit arrives, and is tested against those that arrived before.
+    pub(crate) fn enter(
+        &self,
+        env: &E,
+        unit: UnitId,
+        out: &mut impl Outputs,
+    ) -> Result<(), TableFull> {
+        let found = if self.tables.unit(unit).bypasses {
+            Ok(())
+        } else {
+            match self.config.broad_phase {
+                BroadPhase::Spatial => self.meet_earlier(env, unit, out),
+                BroadPhase::Pairwise => {
+                    self.meet_modelled(env, unit, out);
+                    Ok(())
+                }
+            }
+        };
+        self.leave_gate(unit, out);
+        found
+    }
+
+    /// Tests `unit` against every earlier arrival. A table that is full is reported once,
+    /// with the last refusal's need; the frame goes on without the pairs that did not fit.
+    fn meet_earlier(&self, env: &E, unit: UnitId, out: &mut impl Outputs) -> Result<(), TableFull> {
+        let slot = self.tables.unit(unit);
+        let mut outcome = Ok(());
+        let mut earlier = self.arrivals.arrive(unit.0, &slot.arrival).map(UnitId);
+        // SAFETY: a unit that has entered the frame is not updated before the gate opens, for
+        // which this unit must have left it; until then it is only read.
+        unsafe {
+            slot.object.with(|object| {
+                if env.interacts_within(object) {
+                    outcome = self.found(unit, unit, out).and(outcome);
+                }
+                while let Some(other) = earlier {
+                    let met = self.tables.unit(other);
+                    if met.object.with(|object_met| env.broad_phase(object, object_met)) {
+                        outcome = self.found(unit, other, out).and(outcome);
+                    }
+                    earlier = Arrivals::before(&met.arrival).map(UnitId);
+                }
+            });
+        }
+        outcome
+    }
+
+    /// A pair found at run time.
+    fn found(&self, unit: UnitId, other: UnitId, out: &mut impl Outputs) -> Result<(), TableFull> {
+        let id = self.tables.claim_candidate(self.next_frame(unit))?;
+        self.tables.interaction(id).join([unit.min(other), unit.max(other)]);
+        self.candidate(id, out);
+        Ok(())
+    }
+
+    /// Arrives at every modelled interaction of `unit` and tests those whose other end is there.
+    fn meet_modelled(&self, env: &E, unit: UnitId, out: &mut impl Outputs) {
+        let mut next = self.tables.unit(unit).modelled.load(site::LIST_FOLLOW);
+        while next != NONE {
+            let id = InteractionId(next);
+            let slot = self.tables.interaction(id);
+            next = slot.next(Chain::Modelled, unit);
+            if !slot.arrivals.arrive() {
+                continue;
+            }
+            slot.arrivals.arm(2);
+            let [a, b] = slot.ends().map(|end| self.tables.unit(end));
+            // SAFETY: both ends have entered the frame and this one has not left the gate, so
+            // neither is updated; see `meet_earlier`.
+            let near = unsafe { a.object.with(|a| b.object.with(|b| env.broad_phase(a, b))) };
+            if near {
+                self.candidate(id, out);
+            }
+        }
+    }
+
+    /// Counts an interaction at both ends before anyone can end it, then lets it go.
+    fn candidate(&self, id: InteractionId, out: &mut impl Outputs) {
+        let [a, b] = self.tables.interaction(id).ends();
+        for end in ends(a, b) {
+            self.tables.push_candidate(id, end);
+            self.tables.unit(end).pending.add(1);
+        }
+        out.emit(Work::Interact(id));
+    }
+
+    /// `unit` has entered its frame and made its tests. The last one opens the frame: whatever
+    /// has no interactions left, and is rendered, can be updated.
+    fn leave_gate(&self, unit: UnitId, out: &mut impl Outputs) {
+        // Read before leaving: afterwards the unit may be updated by someone else.
+        let frame = self.next_frame(unit);
+        if !self.window.gate.arrive() {
+            return;
+        }
+        self.arrivals.clear();
+        self.tables.reset_pools(frame.next());
+        self.window.opened(frame);
+        (0..self.tables.units.len() as u32).for_each(|unit| self.ready(UnitId(unit), out));
+    }
+
+    /// One thing less that `unit`'s update waits for.
+    #[inline]
+    fn ready(&self, unit: UnitId, out: &mut impl Outputs) {
+        if self.tables.unit(unit).pending.arrive() {
+            out.emit(Work::Update(unit));
+        }
+    }
+
+    /// Interaction: exact detection and response.
+    pub(crate) fn interact(
+        &self,
+        env: &E,
+        id: InteractionId,
+        out: &mut impl Outputs,
+    ) -> Result<(), E::Error> {
+        let slot = self.tables.interaction(id);
+        let [a, b] = slot.ends();
+        let frame = self.next_frame(a);
+        let pair = Pair { id, frame, ends: [a, b] };
+        let mut contacts = Contacts::new(&self.tables.pools, frame);
+        // SAFETY: this interaction's count at both ends keeps both from being updated; an
+        // interaction is in one place at a time, so its state is this worker's alone, and its
+        // readers, the ends' updates, wait for it.
+        let outcome = unsafe {
+            let a = &self.tables.unit(a).object;
+            let b = &self.tables.unit(b).object;
+            slot.state.with_mut(|state| {
+                a.with(|a| b.with(|b| env.interact(pair, a, b, state, &mut contacts)))
+            })
+        };
+        slot.contacts.store(contacts.first(), site::SLOT_FIELD);
+        for end in ends(a, b) {
+            self.ready(end, out);
+        }
+        outcome
+    }
+
+    /// Update: the unit goes to `frame`, then to rendering, then or at once to the next frame.
+    pub(crate) fn update(
+        &self,
+        env: &E,
+        unit: UnitId,
+        holder: bool,
+        out: &mut impl Outputs,
+    ) -> Result<(), E::Error> {
+        let slot = self.tables.unit(unit);
+        let frame = self.next_frame(unit);
+        let mut inputs = Inputs::new(&self.tables, unit, frame);
+        // SAFETY: the unit's countdown has ended: every interaction and the rendering that read
+        // it are done, and none starts before it enters the next frame below.
+        let outcome =
+            unsafe { slot.object.with_mut(|object| env.update(unit, frame, object, &mut inputs)) };
+        drop(inputs);
+        slot.candidates.store(NONE, site::CANDIDATE_HEAD);
+        // The next update waits for its frame's opening and for this frame's rendering. Stored
+        // before the unit is passed on to either.
+        slot.pending.arm(2);
+        slot.frame.store(frame.next().0, site::FRAME_TAG);
+        if holder && self.window.display() == frame {
+            out.emit(Work::Render(unit));
+        } else {
+            out.queue(Work::Render(unit));
+        }
+        if self.config.entry == Entry::AfterUpdate {
+            self.advance(unit, frame, out);
+        }
+        outcome
+    }
+
+    /// Lets `unit`, done with `frame`, enter the next one, if there is to be one.
+    fn advance(&self, unit: UnitId, frame: Frame, out: &mut impl Outputs) {
+        if frame.next() == self.window.limit {
+            return;
+        }
+        if self.tables.unit(unit).bypasses {
+            self.leave_gate(unit, out);
+        } else {
+            out.emit(Work::Enter(unit));
+        }
+    }
+
+    /// Render: draws the unit; the frame's last one swaps.
+    pub(crate) fn render(
+        &self,
+        env: &E,
+        unit: UnitId,
+        token: &mut Token<'_, E::Renderer>,
+        out: &mut impl Outputs,
+    ) -> Result<(), E::Error> {
+        let frame = self.rendered_frame(unit);
+        let renderer = &mut token.renderer;
+        // SAFETY: the unit's next update waits for the arrival below; until then it is only read.
+        let mut outcome = unsafe {
+            let object = &self.tables.unit(unit).object;
+            object.with(|object| env.render(unit, frame, object, renderer))
+        };
+        if self.config.entry == Entry::AfterRender {
+            self.advance(unit, frame, out);
+        }
+        self.ready(unit, out);
+        if self.window.renders.arrive() {
+            outcome = outcome.and(env.swap(frame, renderer));
+            self.window.swapped(frame);
+            self.after_swap(frame, out);
+        }
+        outcome
+    }
+
+    fn after_swap(&self, frame: Frame, out: &mut impl Outputs) {
+        if frame.next() == self.window.limit {
+            // Whoever sleeps shall see that the pipeline is at rest.
+            out.all_done();
+            return;
+        }
+        if self.config.entry == Entry::AfterSwap {
+            (0..self.tables.units.len() as u32)
+                .for_each(|unit| self.advance(UnitId(unit), frame, out));
+        }
+        // What waited for this swap in the other render queue is now visible to other holders.
+        out.renders_visible();
+    }
+}
+
+/// The distinct ends of an interaction.
+fn ends(a: UnitId, b: UnitId) -> impl Iterator<Item = UnitId> {
+    [Some(a), (a != b).then_some(b)].into_iter().flatten()
+}

@@ -1,0 +1,48 @@
+//! Runs every model. Plain `cargo test` does: the library under test is compiled under loom
+//! whatever the environment says.
+
+mod models;
+
+macro_rules! explored {
+    ($($primitive:ident: $($model:ident)*;)*) => {
+        $(mod $primitive {
+            $(#[test]
+            fn $model() {
+                super::models::run(concat!(stringify!($primitive), "::", stringify!($model)));
+            })*
+        })*
+        const EXPLORED: &[&str] = &[$($(concat!(stringify!($primitive), "::", stringify!($model))),*),*];
+    };
+}
+
+explored! {
+    ring: hand_over earlier_push_is_found two_producers one_slot_laps two_slot_laps two_consumers;
+    countdown: last_sees_all add_and_arm;
+    arrivals: pairs_meet_once next_frame;
+    inbox: one_letter two_senders this_frame_stays full_pool;
+    latest: one_reader slots_are_reused two_readers reader_is_replaced readers_are_limited;
+    bell: ring_shows_work all_sleepers_end render_wakes_holders_only leaver_passes_it_on;
+    token: never_doubled static_once;
+    pipeline: spatial_after_update spatial_after_render spatial_after_swap pairwise_after_update
+        pairwise_after_render pairwise_after_swap pools_come_round two_tokens solitary_unit letters
+        errors_do_no_harm finished_shows_all;
+}
+
+/// No model is left out of the list above.
+#[test]
+fn every_model_has_a_test() {
+    let mut listed: Vec<_> = models::all().map(|(name, _)| name).collect();
+    let mut explored = EXPLORED.to_vec();
+    listed.sort_unstable();
+    explored.sort_unstable();
+    assert_eq!(explored, listed);
+}
+
+/// The library's atomics are loom's: outside a model they refuse to work.
+#[test]
+fn the_library_is_compiled_under_loom() {
+    let outside = std::panic::catch_unwind(|| {
+        dualframe_core_model::countdown::Countdown::new(1).arrive();
+    });
+    assert!(outside.is_err(), "these would be models of nothing");
+}

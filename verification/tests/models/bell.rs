@@ -1,0 +1,219 @@
+//! Sleeping and waking: no wake-up is lost, and none goes to a worker that cannot use it.
+//!
+//! A lost wake-up is a sleeper that spins on its bell for ever while nobody else has work, which
+//! exceeds loom's limit of branches and fails the model. Nothing here blocks in loom's own
+//! condition variables: they would hand out ordering that the bells have to give.
+
+use super::pipeline::{Screen, Setup, build, build_with, step, verify};
+use super::{Guarded, Model, Role, check, lend, lock, together};
+use dualframe_core_model::stage::Stage;
+use dualframe_core_model::wait::{Bell, Epoch, Waiting};
+use dualframe_core_model::worker::Step;
+use loom::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::mem::ManuallyDrop;
+use std::sync::Mutex;
+
+pub(crate) const ALL: &[Model] = &[
+    ("bell::ring_shows_work", ring_shows_work),
+    ("bell::all_sleepers_end", all_sleepers_end),
+    ("bell::render_wakes_holders_only", render_wakes_holders_only),
+    ("bell::leaver_passes_it_on", leaver_passes_it_on),
+];
+
+/// A holder waits for what the other worker queues for it: it wakes, and then there is work, for
+/// its very next step.
+fn ring_shows_work() {
+    check("bell::ring_shows_work", None, 2, [true], |order| {
+        let (pipeline, world) = build(Setup { units: 1, frames: 1, ..Setup::default() });
+        let screen: Screen = lend(Guarded::new(0));
+        let mut updater = pipeline.worker();
+        // Entered; the update is carried.
+        assert_ne!(step(&mut updater, world), Step::Idle);
+        let update: Role<bool> = Box::new(move || step(&mut updater, world) != Step::Idle);
+        let render: Role<bool> = Box::new(move || {
+            let mut worker = pipeline.worker();
+            let Ok(token) = pipeline.token(screen) else { panic!("a token is left") };
+            assert!(worker.hold(token).is_ok());
+            worker.wait();
+            let worked = step(&mut worker, world) != Step::Idle;
+            assert!(worked, "woken for nothing");
+            worked
+        });
+        let worked = together(order, vec![update, render])[1];
+        verify(pipeline, world);
+        worked
+    });
+}
+
+/// Two workers who wait whenever they are idle: both come to an end. The outcome is who updated.
+fn all_sleepers_end() {
+    check("bell::all_sleepers_end", Some(3), 2, [false, true], |order| {
+        let (pipeline, world) = build(Setup { units: 1, frames: 1, ..Setup::default() });
+        let screen: Screen = lend(Guarded::new(0));
+        let role = |holder: bool| -> Role<u32> {
+            Box::new(move || {
+                let mut worker = pipeline.worker();
+                if holder {
+                    let Ok(token) = pipeline.token(screen) else { panic!("a token is left") };
+                    assert!(worker.hold(token).is_ok());
+                }
+                let mut worked = 0;
+                while !pipeline.finished() {
+                    if step(&mut worker, world) != Step::Idle {
+                        worked += 1;
+                    } else {
+                        worker.wait();
+                    }
+                }
+                worked
+            })
+        };
+        let worked = together(order, vec![role(true), role(false)]);
+        verify(pipeline, world);
+        assert_eq!(worked.iter().sum::<u32>(), 3);
+        worked[0] == 3
+    });
+}
+
+/// Notes whom the bells wake.
+struct Noted(&'static Mutex<Vec<(bool, u32)>>);
+
+impl Waiting for Noted {
+    fn sleep(&self, bell: &Bell, seen: Epoch) {
+        while !bell.rung_since(seen) {
+            loom::hint::spin_loop();
+        }
+    }
+
+    fn wake(&self, bell: &Bell, count: u32) {
+        lock(self.0).push((bell.is_for_holders(), count));
+    }
+}
+
+/// A worker without a token sleeps through the announcement of a rendering, and wakes at the end.
+fn render_wakes_holders_only() {
+    let others = (false, 1);
+    let expected = [vec![], vec![others]];
+    check("bell::render_wakes_holders_only", None, 2, expected, |order| {
+        let woken: &Mutex<Vec<_>> = lend(Mutex::default());
+        let setup = Setup { units: 1, frames: 1, ..Setup::default() };
+        let (pipeline, world) = build_with(setup, Noted(woken));
+        let screen: Screen = lend(Guarded::new(0));
+        let mut updater = pipeline.worker();
+        assert_ne!(step(&mut updater, world), Step::Idle);
+        let update: Role<()> = Box::new(move || {
+            // Queues the rendering and announces it; then takes the token and renders.
+            assert_ne!(step(&mut updater, world), Step::Idle);
+            assert!(lock(woken).is_empty(), "nobody who could render sleeps");
+            let Ok(token) = pipeline.token(screen) else { panic!("a token is left") };
+            assert!(updater.hold(token).is_ok());
+            assert_ne!(step(&mut updater, world), Step::Idle);
+        });
+        let sleep: Role<()> = Box::new(move || {
+            let worker = pipeline.worker();
+            worker.wait();
+            assert!(pipeline.finished(), "woken before there is cause");
+        });
+        together(order, vec![update, sleep]);
+        verify(pipeline, world);
+        lock(woken).clone()
+    });
+}
+
+/// Sleeps and wakes as a futex does: whoever is not asleep when the epoch moves does not fall
+/// asleep, and one call wakes one.
+struct One {
+    /// Puts falling asleep and waking in an order.
+    bucket: AtomicU32,
+    asleep: Mutex<Vec<(bool, &'static AtomicBool)>>,
+    flags: Mutex<Vec<&'static AtomicBool>>,
+    /// This thread's sleep returns at once, as every sleep may.
+    restless: Mutex<Option<loom::thread::ThreadId>>,
+    /// The model is over for whoever still sleeps. Not loom's: it orders nothing.
+    over: Mutex<bool>,
+}
+
+impl Waiting for One {
+    fn sleep(&self, bell: &Bell, seen: Epoch) {
+        if *lock(&self.restless) == Some(loom::thread::current().id()) {
+            return;
+        }
+        // Made before the threads were: loom counts the making of an atomic as an access.
+        let Some(woken) = lock(&self.flags).pop() else { panic!("sleeps too often") };
+        lock(&self.asleep).push((bell.is_for_holders(), woken));
+        self.bucket.fetch_add(1, Ordering::AcqRel);
+        if bell.rung_since(seen) {
+            lock(&self.asleep).retain(|(_, at)| !std::ptr::eq(*at, woken));
+            return;
+        }
+        while !woken.load(Ordering::Acquire) && !*lock(&self.over) {
+            loom::hint::spin_loop();
+        }
+    }
+
+    fn wake(&self, bell: &Bell, count: u32) {
+        self.bucket.fetch_add(1, Ordering::AcqRel);
+        for _ in 0..count {
+            let chosen = {
+                let mut asleep = lock(&self.asleep);
+                let at = asleep.iter().position(|at| at.0 == bell.is_for_holders());
+                at.map(|at| asleep.remove(at).1)
+            };
+            let Some(chosen) = chosen else { break };
+            chosen.store(true, Ordering::Release);
+        }
+    }
+}
+
+/// A worker announces one update that it queued, and is suspended. Of two that wait, one leaves
+/// when it wakes, whatever for: the other does the update. It may hold the token, and wait at
+/// another bell; and the one that leaves may have woken by itself.
+fn leaver_passes_it_on() {
+    let all = [[false, false], [false, true], [true, true]];
+    check("bell::leaver_passes_it_on", Some(1), 9, all, |order| {
+        let [holder, restless] = [order / 3 == 2, order / 3 > 0];
+        let setup = Setup { frames: 1, ..Setup::default() };
+        let waiting: &One = lend(One {
+            bucket: AtomicU32::new(0),
+            asleep: Mutex::default(),
+            flags: Mutex::new((0..8).map(|_| &*lend(AtomicBool::new(false))).collect()),
+            restless: Mutex::default(),
+            over: Mutex::default(),
+        });
+        let (pipeline, world) = build_with(setup, waiting);
+        let screen: Screen = lend(Guarded::new(0));
+        // Never dropped: it stays where it is.
+        let suspended = &mut **lend(ManuallyDrop::new(pipeline.worker()));
+        // Both units enter; their interaction is carried.
+        for _ in 0..2 {
+            assert_ne!(step(suspended, world), Step::Idle);
+        }
+        let interact: Role<Step> = Box::new(move || step(suspended, world));
+        let leave: Role<Step> = Box::new(move || {
+            if restless {
+                *lock(&waiting.restless) = Some(loom::thread::current().id());
+            }
+            let worker = pipeline.worker();
+            worker.wait();
+            Step::Idle
+        });
+        let stay: Role<Step> = Box::new(move || {
+            let mut worker = pipeline.worker();
+            if holder {
+                let Ok(token) = pipeline.token(screen) else { panic!("a token is left") };
+                assert!(worker.hold(token).is_ok());
+            }
+            loop {
+                worker.wait();
+                let done = step(&mut worker, world);
+                if done != Step::Idle {
+                    *lock(&waiting.over) = true;
+                    return done;
+                }
+            }
+        });
+        let done = together(order, vec![interact, leave, stay]);
+        assert_eq!(done[2], Step::Worked(Stage::Update), "the update was done");
+        [holder, restless]
+    });
+}
