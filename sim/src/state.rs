@@ -74,3 +74,40 @@ fn write_vectors(hasher: &mut FnvHasher, vectors: &Vectors) {
 fn write(hasher: &mut FnvHasher, value: u32) {
     hasher.write(&value.to_le_bytes());
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::scene::ParticleScene;
+
+    fn hash<'a>(objects: impl IntoIterator<Item = &'a Object>) -> u64 {
+        let mut hash = StateHash::default();
+        objects.into_iter().for_each(|object| hash.add(object));
+        hash.finish()
+    }
+
+    fn mesh(object: &mut Object) -> &mut crate::geometry::Mesh {
+        object.geometry.as_mesh_mut().expect("a particle is a mesh")
+    }
+
+    #[test]
+    fn every_part_of_the_state_counts_and_the_order_does_not() {
+        let scene = || ParticleScene::new(2).build().expect("two particles are allowed").objects;
+        let whole = hash(&scene());
+        assert_eq!(hash(scene().iter().rev()), whole);
+        let changes: [fn(&mut Object); 4] = [
+            |object| mesh(object).positions.set(41, Vec3::ZERO),
+            |object| mesh(object).velocities.add(0, Vec3::Z),
+            |object| object.behavior.process(&crate::message::Message::Weightless(true)),
+            |object| object.process(&crate::message::Message::Remove, 3),
+        ];
+        for (index, change) in changes.into_iter().enumerate() {
+            let mut objects = scene();
+            change(&mut objects[1]);
+            assert_ne!(hash(&objects), whole, "change {index}");
+        }
+        assert_ne!(hash(&scene()[..1]), hash(&scene()[1..2]));
+    }
+}

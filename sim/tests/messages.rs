@@ -74,7 +74,7 @@ fn next_frame_by_sender_and_sequence_before_the_update() {
     expected.extend((2..4).map(|frame| (ObjectId(RECEIVER), frame, u32::MAX, 0)));
     for grain in [Grain::Spatial, Grain::Pairwise] {
         for threads in 1..=3 {
-            for index in 0..4 {
+            for index in 0..7 {
                 let log = Log::default();
                 let (name, mut executor) =
                     executors(|| gossip(&log), grain, threads).swap_remove(index);

@@ -27,6 +27,7 @@ pub struct StaticExecutor {
     shared: Arc<Shared>,
     threads: Vec<JoinHandle<()>>,
     blocking: Blocking,
+    scratch: Scratch,
     grain: Grain,
     running: Duration,
     frame: u64,
@@ -86,7 +87,7 @@ impl StaticExecutor {
         });
         let threads = start(&shared, threads)?;
         let (blocking, running) = (world.blocking, Duration::ZERO);
-        Ok(Self { shared, threads, blocking, grain, running, frame: 0 })
+        Ok(Self { shared, threads, blocking, scratch: Scratch::new(), grain, running, frame: 0 })
     }
 
     /// Forms the blocks anew.
@@ -248,11 +249,10 @@ impl Executor for StaticExecutor {
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<(), ExecutorError> {
         let began = Instant::now();
-        let mut scratch = Scratch::new();
         for _ in 0..frames {
             self.prepare();
             self.shared.barrier.wait();
-            self.shared.compute(0, &mut scratch);
+            self.shared.compute(0, &mut self.scratch);
             let pairs = self.shared.finish();
             self.render(renderer);
             on_frame(&FrameRecord { frame: self.frame, swapped: Instant::now(), pairs });
