@@ -4,7 +4,7 @@
 //! exceeds loom's limit of branches and fails the model. Nothing here blocks in loom's own
 //! condition variables: they would hand out ordering that the bells have to give.
 
-use super::pipeline::{Screen, Setup, build, build_with, step, verify};
+use super::ve::{Screen, Setup, build, build_with, step, verify};
 use super::{Guarded, Model, Role, check, lend, lock, together};
 use dualframe_core_model::stage::Stage;
 use dualframe_core_model::wait::{Bell, Epoch, Waiting};

@@ -10,6 +10,7 @@ pub(crate) mod latest;
 pub(crate) mod pipeline;
 pub(crate) mod ring;
 pub(crate) mod token;
+mod ve;
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;

@@ -1,6 +1,6 @@
 //! The render token: never doubled, and what it guards moves from holder to holder.
 
-use super::pipeline::{Setup, build};
+use super::ve::{Setup, build};
 use super::{Guarded, Model, Role, check, lend, together};
 use dualframe_core_model::storage::Static;
 

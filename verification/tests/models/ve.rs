@@ -1,0 +1,364 @@
+//! A small environment that checks every callback, for the models of the whole pipeline.
+
+use super::{Guarded, lend, lend_slice, lock};
+use dualframe_core_model::contacts::{ContactSlot, Contacts, SegmentSlot};
+use dualframe_core_model::environment::{Environment, Pair};
+use dualframe_core_model::error::TableFull;
+use dualframe_core_model::frame::{Entry, Frame};
+use dualframe_core_model::inbox::LetterSlot;
+use dualframe_core_model::inputs::Inputs;
+use dualframe_core_model::pipeline::{BroadPhase, Config, Pipeline};
+use dualframe_core_model::ring::QueueSlot;
+use dualframe_core_model::stage::Stage;
+use dualframe_core_model::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
+use dualframe_core_model::unit::UnitId;
+use dualframe_core_model::wait::{Spin, Waiting};
+use dualframe_core_model::worker::{Step, Worker};
+use std::sync::Mutex;
+
+/// What a callback saw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Event {
+    /// Two units were tested in a frame.
+    Met([u32; 2], u32),
+    /// An interaction was detected.
+    Interacted([u32; 2], u32),
+    /// A unit was updated.
+    Updated(u32, u32),
+    /// A unit was rendered.
+    Rendered(u32, u32),
+    /// A frame was swapped.
+    Swapped(u32),
+}
+use Event::{Interacted, Met, Rendered, Swapped, Updated};
+
+/// A unit's object.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Body {
+    id: u32,
+    /// Updates so far.
+    updates: u32,
+    value: u32,
+}
+
+/// Size and configuration of a model.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Setup {
+    /// Units; each two of them interact.
+    pub(crate) units: u32,
+    /// Frames.
+    pub(crate) frames: u32,
+    /// Kind of broad phase.
+    pub(crate) broad_phase: BroadPhase,
+    /// Overlap of frames.
+    pub(crate) entry: Entry,
+    /// Render tokens.
+    pub(crate) tokens: u32,
+    /// Units from this number on are solitary.
+    pub(crate) solitary_from: u32,
+    /// Whether unit 0 posts a letter to the last unit in every update.
+    pub(crate) letters: bool,
+    /// Whether every callback returns an error, after its work.
+    pub(crate) fail: bool,
+}
+
+impl Default for Setup {
+    fn default() -> Self {
+        Self {
+            units: 2,
+            frames: 2,
+            broad_phase: BroadPhase::Spatial,
+            entry: Entry::AfterUpdate,
+            tokens: 1,
+            solitary_from: u32::MAX,
+            letters: false,
+            fail: false,
+        }
+    }
+}
+
+impl Setup {
+    fn pairs(&self) -> Vec<[u32; 2]> {
+        let social = self.units.min(self.solitary_from);
+        (0..social).flat_map(|b| (0..b).map(move |a| [a, b])).collect()
+    }
+}
+
+/// The environment. Its journal is a std mutex, which loom does not see: it adds no ordering.
+pub(crate) struct World {
+    setup: Setup,
+    pub(crate) journal: Mutex<Vec<Event>>,
+    /// Every unit's value after its last update.
+    values: Mutex<Vec<u32>>,
+}
+
+/// What the token guards: rendering shares it, swapping has it alone.
+pub(crate) type Screen = &'static Guarded<u32>;
+
+/// A callback's error, or a full table.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// As `Setup::fail` asks for.
+    Asked,
+    /// No model wants one.
+    Full(TableFull),
+}
+
+impl From<TableFull> for Failure {
+    fn from(full: TableFull) -> Self {
+        Self::Full(full)
+    }
+}
+
+fn response(a: u32, b: u32, frame: u32) -> u32 {
+    a.wrapping_mul(7).wrapping_add(b.wrapping_mul(13)).wrapping_add(frame)
+}
+
+/// One term of an update; not commutative, so that the order of the terms shows.
+fn fold(value: u32, term: u32) -> u32 {
+    value.wrapping_mul(31).wrapping_add(term)
+}
+
+impl World {
+    fn log(&self, event: Event) {
+        lock(&self.journal).push(event);
+    }
+
+    fn outcome(&self) -> Result<(), Failure> {
+        if self.setup.fail { Err(Failure::Asked) } else { Ok(()) }
+    }
+}
+
+impl Environment for World {
+    type Object = Body;
+    type Interaction = u32;
+    type Contact = u32;
+    type Message = u32;
+    type Renderer = Screen;
+    type Error = Failure;
+
+    fn broad_phase(&self, a: &Body, b: &Body) -> bool {
+        assert_eq!(a.updates, b.updates, "both ends are in one frame");
+        self.log(Met([a.id.min(b.id), a.id.max(b.id)], a.updates));
+        true
+    }
+
+    fn interact(
+        &self,
+        pair: Pair,
+        a: &Body,
+        b: &Body,
+        state: &mut u32,
+        contacts: &mut Contacts<'_, '_, u32>,
+    ) -> Result<(), Failure> {
+        assert_eq!([a.id, b.id], pair.ends.map(|end| end.0));
+        assert_eq!([a.updates, b.updates], [pair.frame.0; 2], "interact between the updates");
+        *state = pair.frame.0;
+        let result = response(a.value, b.value, pair.frame.0);
+        contacts.push(&[result])?;
+        contacts.push(&[result ^ 1])?;
+        self.log(Interacted([a.id, b.id], pair.frame.0));
+        self.outcome()
+    }
+
+    fn update(
+        &self,
+        unit: UnitId,
+        frame: Frame,
+        body: &mut Body,
+        inputs: &mut Inputs<'_, '_, Self>,
+    ) -> Result<(), Failure> {
+        assert_eq!((unit.0, frame.0), (body.id, body.updates), "updates in order");
+        let mut before = None;
+        for interaction in inputs.interactions() {
+            assert!(before < Some(interaction.other), "interactions in pair order");
+            before = Some(interaction.other);
+            assert_eq!(*interaction.state, frame.0, "the interaction of this frame");
+            for segment in interaction.contacts {
+                body.value = segment.iter().fold(body.value, |value, &term| fold(value, term));
+            }
+        }
+        while let Some((from, message)) = inputs.next_letter() {
+            assert_eq!((from.sender, from.sequence), (0, 0));
+            assert_eq!(message + 1, frame.0, "posted in the frame before");
+            body.value = fold(body.value, message);
+        }
+        if self.setup.letters && unit.0 == 0 {
+            let posted = inputs.post(UnitId(self.setup.units - 1), 0, frame.0);
+            assert!(posted.is_ok(), "letters for two frames");
+        }
+        body.updates += 1;
+        lock(&self.values)[unit.index()] = body.value;
+        self.log(Updated(unit.0, frame.0));
+        self.outcome()
+    }
+
+    fn render(
+        &self,
+        unit: UnitId,
+        frame: Frame,
+        body: &Body,
+        screen: &mut Screen,
+    ) -> Result<(), Failure> {
+        assert_eq!((unit.0, frame.0 + 1), (body.id, body.updates), "rendered as updated");
+        assert_eq!(screen.get(), frame.0, "all frames before are swapped, this one is not");
+        self.log(Rendered(unit.0, frame.0));
+        self.outcome()
+    }
+
+    fn swap(&self, frame: Frame, screen: &mut Screen) -> Result<(), Failure> {
+        assert_eq!(screen.get(), frame.0, "frames swap in order");
+        screen.set(frame.0 + 1);
+        self.log(Swapped(frame.0));
+        self.outcome()
+    }
+}
+
+/// The pipeline of a model.
+pub(crate) type Piped<W> = Pipeline<'static, World, W>;
+
+/// A pipeline with its frames let run.
+pub(crate) fn build_with<W: Waiting + 'static>(
+    setup: Setup,
+    waiting: W,
+) -> (&'static Piped<W>, &'static World) {
+    let units = setup.units as usize;
+    let pairs = setup.pairs();
+    let interactions = match setup.broad_phase {
+        BroadPhase::Pairwise => lend(
+            pairs
+                .iter()
+                .map(|&[a, b]| InteractionSlot::between(UnitId(b), UnitId(a), 0))
+                .collect::<Vec<_>>(),
+        ),
+        BroadPhase::Spatial => {
+            lend((0..2 * pairs.len()).map(|_| InteractionSlot::spare(0)).collect())
+        }
+    };
+    // Exactly what two frames need.
+    let contacts = 4 * pairs.len();
+    let letters = if setup.letters { 2 } else { 0 };
+    let queues = queue_slots(units, interactions.len(), letters);
+    let unit = |id: usize| {
+        let body = Body { id: id as u32, updates: 0, value: id as u32 + 1 };
+        if body.id >= setup.solitary_from { UnitSlot::solitary(body) } else { UnitSlot::new(body) }
+    };
+    let memory = Memory {
+        units: lend_slice(units, unit),
+        interactions,
+        contacts: lend_slice(contacts, |_| ContactSlot::new()),
+        segments: lend_slice(contacts, |_| SegmentSlot::new()),
+        letters: lend_slice(letters, |_| LetterSlot::new()),
+        queues: lend_slice(queues, |_| QueueSlot::new()),
+    };
+    let Setup { broad_phase, entry, tokens, .. } = setup;
+    let config = Config { broad_phase, entry, tokens };
+    let pipeline = lend(Pipeline::new(memory, config, waiting).unwrap());
+    pipeline.run(setup.frames).unwrap();
+    (pipeline, lend(World { setup, journal: Mutex::default(), values: Mutex::new(vec![0; units]) }))
+}
+
+/// A pipeline whose workers spin where they wait.
+pub(crate) fn build(setup: Setup) -> (&'static Piped<Spin>, &'static World) {
+    build_with(setup, Spin)
+}
+
+/// One step; asserts that it fails only where it was asked to.
+pub(crate) fn step<W: Waiting>(
+    worker: &mut Worker<'static, 'static, World, W>,
+    world: &World,
+) -> Step {
+    match worker.step(world) {
+        Ok(step) => step,
+        Err(Failure::Asked) => {
+            assert!(world.setup.fail);
+            // The error does not say of which stage it is; nor does any model ask.
+            Step::Worked(Stage::Interaction)
+        }
+        Err(Failure::Full(full)) => panic!("{full}"),
+    }
+}
+
+/// A worker's life: steps until all frames are swapped.
+pub(crate) fn work<W: Waiting>(pipeline: &'static Piped<W>, world: &World, screen: Option<Screen>) {
+    let mut worker = pipeline.worker();
+    if let Some(screen) = screen {
+        let Ok(token) = pipeline.token(screen) else { panic!("a token is left") };
+        assert!(worker.hold(token).is_ok());
+    }
+    while !pipeline.finished() {
+        if step(&mut worker, world) == Step::Idle {
+            loom::thread::yield_now();
+        }
+    }
+}
+
+/// The values that a plain serial loop computes.
+fn serial(setup: Setup) -> Vec<u32> {
+    let mut values: Vec<u32> = (1..=setup.units).collect();
+    for frame in 0..setup.frames {
+        let old = values.clone();
+        for (unit, value) in values.iter_mut().enumerate() {
+            // In the order of the other end.
+            let mut pairs = setup.pairs();
+            pairs.retain(|pair| pair.contains(&(unit as u32)));
+            pairs.sort_unstable_by_key(|&[a, b]| if a == unit as u32 { b } else { a });
+            for [a, b] in pairs {
+                let result = response(old[a as usize], old[b as usize], frame);
+                *value = fold(fold(*value, result), result ^ 1);
+            }
+            if setup.letters && unit as u32 == setup.units - 1 && frame > 0 {
+                *value = fold(*value, frame - 1);
+            }
+        }
+    }
+    values
+}
+
+/// Checks a finished run (invariants 1 to 4, 6, 9) and returns the order of its callbacks.
+pub(crate) fn verify<W: Waiting>(pipeline: &'static Piped<W>, world: &World) -> Vec<Event> {
+    let setup = world.setup;
+    assert!(pipeline.finished());
+    let journal = lock(&world.journal).clone();
+    let at = |event: Event| {
+        let mut found = journal.iter().enumerate().filter(|(_, logged)| **logged == event);
+        let first = found.next().unwrap_or_else(|| panic!("{event:?} is missing: {journal:?}")).0;
+        assert!(found.next().is_none(), "{event:?} twice: {journal:?}");
+        first
+    };
+    let mut expected = 0;
+    let before = |first: Event, then: Event| {
+        assert!(at(first) < at(then), "{then:?} before {first:?}: {journal:?}");
+    };
+    for frame in 0..setup.frames {
+        for pair in setup.pairs() {
+            expected += 2;
+            before(Met(pair, frame), Interacted(pair, frame));
+            for end in pair {
+                before(Interacted(pair, frame), Updated(end, frame));
+                if frame > 0 {
+                    before(Updated(end, frame - 1), Met(pair, frame));
+                }
+            }
+        }
+        for unit in 0..setup.units {
+            expected += 2;
+            before(Updated(unit, frame), Rendered(unit, frame));
+            before(Rendered(unit, frame), Swapped(frame));
+            if frame > 0 {
+                before(Rendered(unit, frame - 1), Updated(unit, frame));
+                before(Swapped(frame - 1), Rendered(unit, frame));
+            }
+            if frame > 1 {
+                before(Swapped(frame - 2), Updated(unit, frame));
+            }
+            if frame > 0 && setup.entry == Entry::AfterSwap {
+                before(Swapped(frame - 1), Updated(unit, frame));
+            }
+        }
+        expected += 1;
+    }
+    assert_eq!(journal.len(), expected, "nothing else happened: {journal:?}");
+    assert_eq!(*lock(&world.values), serial(setup), "the state is the same over all interleavings");
+    journal
+}
