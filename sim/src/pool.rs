@@ -105,6 +105,8 @@ struct Room {
 struct Phase {
     /// Counts runs; 0 before the first.
     run: usize,
+    /// Threads that have reported for work.
+    present: usize,
     closed: bool,
 }
 
@@ -145,6 +147,20 @@ impl Crew {
             if phase.run != last && wanted() {
                 return Some(phase.run);
             }
+            phase = self.changed.wait(phase).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// A hired thread is ready: it has taken the memory that it needs.
+    pub(crate) fn report(&self) {
+        lock(&self.phase).present += 1;
+        self.changed.notify_all();
+    }
+
+    /// Waits until so many hired threads are ready.
+    pub(crate) fn await_present(&self, hired: usize) {
+        let mut phase = lock(&self.phase);
+        while phase.present < hired {
             phase = self.changed.wait(phase).unwrap_or_else(PoisonError::into_inner);
         }
     }

@@ -6,7 +6,8 @@ use dualframe_sim::executor::FrameRecord;
 
 use super::AllocationCounter;
 
-/// Frames after which allocations are counted, if there are twice as many.
+/// Frames after which allocations are counted, if there are twice as many; else after half of them,
+/// but at least one.
 const WARM_UP: u64 = 32;
 
 /// A run's frames.
@@ -52,7 +53,7 @@ impl<'a> Measure<'a> {
         self.candidates.push(u32::try_from(record.pairs.candidates).unwrap_or(u32::MAX));
         self.collisions.push(u32::try_from(record.pairs.collisions).unwrap_or(u32::MAX));
         self.last = record.swapped;
-        if record.frame + 1 == WARM_UP.min(self.frames / 2) {
+        if record.frame + 1 == WARM_UP.min(self.frames / 2).max(1) {
             self.at_warm_up = (self.count)();
         }
         if record.frame + 1 == self.frames {

@@ -5,6 +5,7 @@ mod measure;
 mod particles;
 mod report;
 
+use std::error::Error;
 use std::process::ExitCode;
 
 use self::args::Outcome;
@@ -31,7 +32,7 @@ pub(crate) fn main(allocations: AllocationCounter<'_>) -> ExitCode {
     };
     let report = match particles::run(&particles, allocations) {
         Ok(report) => report,
-        Err(error) => return fail(&error.to_string(), UNSOUND),
+        Err(error) => return fail(&with_causes(&error), UNSOUND),
     };
     report.print();
     if let Some(json) = json
@@ -40,6 +41,14 @@ pub(crate) fn main(allocations: AllocationCounter<'_>) -> ExitCode {
         return fail(&line, UNSOUND);
     }
     if report.is_sound() { ExitCode::SUCCESS } else { ExitCode::from(UNSOUND) }
+}
+
+/// An error and what it came from, in one line.
+fn with_causes(error: &dyn Error) -> String {
+    match error.source() {
+        Some(cause) => format!("{error}: {}", with_causes(cause)),
+        None => error.to_string(),
+    }
 }
 
 fn fail(line: &str, status: u8) -> ExitCode {

@@ -13,6 +13,7 @@ mod touches;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use crate::geometry::LANES;
 use crate::object::Object;
 
 pub use contact::{Contact, ContactBuffer, ContactSink, TableFull};
@@ -43,11 +44,24 @@ pub trait Response: Send + Sync {
     );
 }
 
+/// Nodes of one object for which there is room from the start; usually 256, so that a worker's first
+/// interaction need not allocate.
+const NODES: usize = 256;
+
 /// Memory that the interactions of one worker use one after the other.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Scratch {
     touches: Touches,
     impulses: [Impulses; 2],
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        let mut scratch = Self { touches: Touches::default(), impulses: Default::default() };
+        scratch.impulses.iter_mut().for_each(|impulses| impulses.reset(NODES));
+        scratch.touches.near.iter_mut().for_each(|near| near.reserve(NODES / LANES));
+        scratch
+    }
 }
 
 impl Scratch {

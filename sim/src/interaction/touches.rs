@@ -124,7 +124,8 @@ impl NearNodes {
         bounds
     }
 
-    fn reserve(&mut self, chunks: usize) {
+    /// Makes room for the nodes of so many chunks.
+    pub(super) fn reserve(&mut self, chunks: usize) {
         // One more than can be kept: the last write may be one that is not.
         let wanted = (chunks + 1) * LANES;
         if self.nodes.len() < wanted {

@@ -102,11 +102,13 @@ impl PipelineExecutor {
             mail: &mut self.mail,
             most_contacts,
         };
-        let done = context.run(frames, pipeline, regrouping, Screen { renderer, on_frame });
+        let (done, hiring) =
+            context.run(frames, pipeline, regrouping, Screen { renderer, on_frame });
         let report = report.into_inner().unwrap_or_else(PoisonError::into_inner);
         self.tables.unload(&mut self.blocks);
         self.frame += done;
         (self.seconds, self.failure) = (report.seconds, report.failure);
+        hiring.map_err(ExecutorError::Spawn)?;
         self.failure.map_or(Ok(done), |full| Err(full.into()))
     }
 }

@@ -1,5 +1,6 @@
 //! Frames run with the same tables: batches, and the threads that work on them.
 
+use std::io;
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard};
 use std::thread;
 
@@ -95,19 +96,22 @@ pub(super) struct Context<'s, 'x> {
 impl<'s> Context<'s, '_> {
     /// Runs batch after batch until all frames are done, a table fails, or the tables are to
     /// grow; says how many frames were done.
+    ///
+    /// # Errors
+    /// The system gave no thread. The frames done until then are done.
     pub(super) fn run(
         self,
         frames: u64,
         mut pipeline: SimPipeline<'_, 's>,
         mut regrouping: Regrouping<'_>,
         mut screen: Screen<'s>,
-    ) -> u64 {
+    ) -> (u64, io::Result<()>) {
         for (unit, block) in pipeline.objects_mut().enumerate() {
             self.shared.locate(unit, block);
         }
         let mut outcome = regrouping.post_mail(self.shared, &pipeline);
         let pipeline = RwLock::new(pipeline);
-        let mut done = 0;
+        let (mut done, mut hiring) = (0, Ok(()));
         thread::scope(|scope| {
             let _dismissal = Dismissal(self.crew);
             let host = Host::new(self.shared);
@@ -116,9 +120,15 @@ impl<'s> Context<'s, '_> {
                 // Threads beyond the number wanted wait; more are hired as they are asked for.
                 while hired < self.pool.threads() {
                     let (index, pipeline) = (hired, &pipeline);
-                    scope.spawn(move || self.attend(index, pipeline));
+                    let attend = move || self.attend(index, pipeline);
+                    if let Err(error) = thread::Builder::new().spawn_scoped(scope, attend) {
+                        hiring = Err(error);
+                        return;
+                    }
                     hired += 1;
                 }
+                self.crew.await_present(hired - 1);
+                self.make_room_for(hired);
                 let batch = FRAMES_PER_BLOCKING.min(frames - done);
                 let Ok(mut resting) = pipeline.write() else { break };
                 if done > 0 {
@@ -141,7 +151,7 @@ impl<'s> Context<'s, '_> {
             self.fail(full);
         }
         regrouping.take_mail(&mut pipeline.into_inner().unwrap_or_else(PoisonError::into_inner));
-        done
+        (done, hiring)
     }
 
     /// The calling thread's part in a batch: it alone renders.
@@ -167,9 +177,10 @@ impl<'s> Context<'s, '_> {
     fn attend(self, index: usize, pipeline: &RwLock<SimPipeline<'_, 's>>) {
         self.pool.pin(index);
         let host = Host::new(self.shared);
+        self.crew.report();
         let mut last = 0;
         while let Some(run) = self.crew.await_run(last, self.pool, index) {
-            let _dismissal = OnPanic(self.crew);
+            let _guard = OnPanic(self.crew);
             let pipeline = read(pipeline);
             self.work(index, &pipeline, &host, None);
             // Whoever left because fewer were wanted may be wanted again in the same batch.
@@ -208,12 +219,19 @@ impl<'s> Context<'s, '_> {
         worker.release()
     }
 
+    /// Notes the times of so many workers without allocating later.
+    fn make_room_for(self, workers: usize) {
+        let mut report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
+        if report.seconds.len() < workers {
+            report.seconds.resize(workers, StageSeconds::default());
+        }
+    }
+
     fn note(self, index: usize, clock: &StageClock) {
         let mut report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
-        if report.seconds.len() <= index {
-            report.seconds.resize(index + 1, StageSeconds::default());
+        if let Some(seconds) = report.seconds.get_mut(index) {
+            clock.add_to(seconds);
         }
-        clock.add_to(&mut report.seconds[index]);
     }
 
     /// Notes the first failure and makes everybody leave: a frame without some of its
