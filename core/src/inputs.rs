@@ -74,7 +74,8 @@ impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
     }
 
     /// Posts a letter to `to`, who processes it in the next frame's update. Letters of one update
-    /// keep their order.
+    /// keep their order. Only one unit may post under a `sender` number in a frame: letters of the
+    /// same sender and place in the sequence would come in the order of arrival.
     ///
     /// # Errors
     /// [`Rejected`] with the message if all letters are under way.

@@ -35,7 +35,7 @@ pub struct Config {
     pub broad_phase: BroadPhase,
     /// How far consecutive frames overlap.
     pub entry: Entry,
-    /// How many workers may render at once.
+    /// How many workers may render at once; with 0 no frame is ever swapped.
     pub tokens: u32,
 }
 

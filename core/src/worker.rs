@@ -151,7 +151,8 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
     ///
     /// # Errors
     /// The callback's error, or a full table of candidates. The work unit counts as done either
-    /// way, and the pipeline is sound: stepping may go on.
+    /// way, and the pipeline is sound: stepping may go on. Where a frame's last rendering and its
+    /// swap both fail, the rendering's error is returned.
     pub fn step(&mut self, env: &E) -> Result<Step, E::Error> {
         let Some(work) = self.next_work() else { return Ok(Step::Idle) };
         self.stage = Stage::of(work);
