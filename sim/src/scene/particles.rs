@@ -209,10 +209,21 @@ fn lattice(count: usize) -> Vec<Vec3> {
         }
     }
     sites.sort_unstable_by_key(|&[x, y, z]| (x * x + y * y + z * z, x, y, z));
+    sites.truncate(count);
+    // Numbered, and so laid out in memory, by place: a block's objects lie together.
+    sites.sort_unstable_by_key(|site| z_order(site.map(|coordinate| (coordinate + reach) as u32)));
     // Neighbours are one apart in two of the three coordinates.
     let unit = SPACING / 2.0_f32.sqrt();
     let place = |site: [i32; 3]| Vec3::from_array(site.map(|coordinate| coordinate as f32 * unit));
-    sites.into_iter().take(count).map(place).collect()
+    sites.into_iter().map(place).collect()
+}
+
+/// The place of a cell on the Z-order curve, which keeps neighbours close: the bits of the three
+/// coordinates in turn. Coordinates are below 2^21.
+fn z_order(cell: [u32; 3]) -> u64 {
+    let bit =
+        |index: u32, axis: usize| u64::from(cell[axis] >> index & 1) << (3 * index + axis as u32);
+    (0..21).flat_map(|index| (0..3).map(move |axis| bit(index, axis))).sum()
 }
 
 /// Half the side of the room, in metres: the density is the same for any number of particles, except
