@@ -54,14 +54,6 @@ impl Geometry {
         }
     }
 
-    /// The rigid shape, to move it, if it is one.
-    pub fn as_rigid_mut(&mut self) -> Option<&mut Rigid> {
-        match self {
-            Self::Rigid(rigid) => Some(rigid),
-            Self::Mesh(_) => None,
-        }
-    }
-
     /// The middle of it, in metres: the mean of a surface's nodes, a rigid shape's origin.
     #[must_use]
     pub fn center(&self) -> Vec3 {
