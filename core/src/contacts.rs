@@ -22,7 +22,7 @@ use crate::unit::NONE;
 pub struct ContactSlot<C>(UnsafeCell<MaybeUninit<C>>);
 
 // SAFETY: a slot is written by the one claimer of its range and read by others only after the
-// interaction was released to its ends' countdowns; see `Pool::push` and `Segments::next`.
+// interaction was released to its ends' countdowns; see `Pools::write` and `Segments::next`.
 unsafe impl<C: Send + Sync> Sync for ContactSlot<C> {}
 
 impl<C> ContactSlot<C> {
@@ -129,8 +129,8 @@ impl<'m, C: Copy> Pools<'m, C> {
         self.rooms[frame.parity()].used()
     }
 
-    /// Writes `records` and returns the index of their segment.
-    fn push(&self, frame: Frame, records: &[C]) -> Result<u32, TableFull> {
+    /// Writes `records`, whose segments are still to be marked, and returns the index of the first.
+    fn write(&self, frame: Frame, records: &[C]) -> Result<u32, TableFull> {
         // A longer slice cannot fit either, and is named by the length that does not.
         let length = u32::try_from(records.len()).unwrap_or(u32::MAX);
         let claimed = self.rooms[frame.parity()].claim(length, self.half, Table::Contacts)?;
@@ -141,12 +141,6 @@ impl<'m, C: Copy> Pools<'m, C> {
         unsafe {
             let first = UnsafeCell::raw_get(room.as_ptr().cast::<UnsafeCell<MaybeUninit<C>>>());
             ::core::ptr::copy_nonoverlapping(records.as_ptr(), first.cast::<C>(), records.len());
-        }
-        // SAFETY: the header belongs to the range just claimed.
-        unsafe {
-            self.segments[start as usize]
-                .0
-                .with_mut(|header| *header = Header { length, next: NONE });
         }
         Ok(start)
     }
@@ -185,10 +179,38 @@ impl<'a, 'm, C: Copy> Contacts<'a, 'm, C> {
     /// [`TableFull`] if the frame's pool has no room; nothing is written then.
     #[inline]
     pub fn push(&mut self, records: &[C]) -> Result<(), TableFull> {
-        if records.is_empty() {
+        self.push_segments(records, &[records.len()])
+    }
+
+    /// Appends `records` as several segments, at the price of one: `ends` says where in `records`
+    /// each segment ends, in ascending order. What is past the last end is left out, and an end
+    /// that is too small or too large is taken for the nearest.
+    ///
+    /// # Errors
+    /// [`TableFull`] if the frame's pool has no room for all of them; nothing is written then.
+    pub fn push_segments(&mut self, records: &[C], ends: &[usize]) -> Result<(), TableFull> {
+        let total = ends.last().map_or(0, |&end| end.min(records.len()));
+        if total == 0 {
             return Ok(());
         }
-        let segment = self.pools.push(self.frame, records)?;
+        let base = self.pools.write(self.frame, &records[..total])?;
+        let mut start = 0;
+        for &end in ends {
+            let end = end.clamp(start, total);
+            if end > start {
+                self.append(base + start as u32, (end - start) as u32);
+            }
+            start = end;
+        }
+        Ok(())
+    }
+
+    /// Marks `length` records from `segment` on, which were just claimed, as the next segment.
+    #[inline]
+    fn append(&mut self, segment: u32, length: u32) {
+        let header = &self.pools.segments[segment as usize].0;
+        // SAFETY: the header belongs to the range just claimed.
+        unsafe { header.with_mut(|header| *header = Header { length, next: NONE }) };
         if self.last == NONE {
             self.first = segment;
         } else {
@@ -197,11 +219,10 @@ impl<'a, 'm, C: Copy> Contacts<'a, 'm, C> {
             unsafe { last.with_mut(|header| header.next = segment) };
         }
         self.last = segment;
-        Ok(())
     }
 }
 
-/// An interaction's results: a slice for each push, in the order of the pushes.
+/// An interaction's results: a slice for each segment, in the order of the pushes.
 #[derive(Debug)]
 pub struct Segments<'a, 'm, C> {
     pools: &'a Pools<'m, C>,
@@ -221,7 +242,7 @@ impl<'a, C> Iterator for Segments<'a, '_, C> {
         let header = unsafe { self.pools.segments[start].0.with(|header| *header) };
         self.next = header.next;
         let room = &self.pools.contacts[start..start + header.length as usize];
-        // SAFETY: `push` initialised the range before it wrote the header; it is not written
+        // SAFETY: `write` initialised the range before the header was written; it is not written
         // again while this frame's results are read.
         Some(unsafe { ::core::slice::from_raw_parts(room.as_ptr().cast::<C>(), room.len()) })
     }

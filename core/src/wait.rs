@@ -103,11 +103,29 @@ impl Bell {
 pub(crate) struct Bells {
     pub(crate) holders: Bell,
     pub(crate) others: Bell,
+    /// Workers whose last step found nothing to do, awake or asleep.
+    hungry: CachePadded<Atomic>,
 }
 
 impl Bells {
     pub(crate) fn new() -> Self {
-        Self { holders: Bell::new(true), others: Bell::new(false) }
+        let hungry = CachePadded::new(Atomic::new(0));
+        Self { holders: Bell::new(true), others: Bell::new(false), hungry }
+    }
+
+    /// Whether some worker found nothing to do: a hint, so that others queue what they carry.
+    #[inline]
+    pub(crate) fn somebody_is_hungry(&self) -> bool {
+        self.hungry.load(site::HUNGRY) != 0
+    }
+
+    /// One more worker, or one less, finds nothing to do.
+    pub(crate) fn count_hungry(&self, hungry: bool) {
+        if hungry {
+            self.hungry.fetch_add(1, site::HUNGRY);
+        } else {
+            self.hungry.fetch_sub(1, site::HUNGRY);
+        }
     }
 
     /// Announces `any` work units that every worker can do, and `renders` that only holders can.

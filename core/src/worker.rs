@@ -1,5 +1,7 @@
 //! Workers: one step, one work unit (§5.3).
 
+use heapless::Vec;
+
 use crate::environment::Environment;
 use crate::error::TableFull;
 use crate::migrate::migrate;
@@ -32,26 +34,55 @@ pub(crate) trait Outputs {
     fn all_done(&mut self);
 }
 
-/// Carry-over (§4.2): the first output is carried, the others are queued; and how many sleepers
-/// the queued ones are to wake.
+/// Work units that a worker may carry at once: more than one block has neighbours, so that a unit's
+/// interactions need no queue. Usually 32; beyond it they are queued.
+#[cfg(not(loom))]
+const MOST_CARRIED: usize = 32;
+/// Nobody else sees what is carried: what is queued is what models are about.
+#[cfg(loom)]
+const MOST_CARRIED: usize = 1;
+
+/// Carry-over (§4.2): outputs are carried, newest first, as long as nobody is hungry; and how many
+/// sleepers what was queued is to wake.
 struct Carry<'p, 'm, E: Environment, W: Waiting> {
     pipeline: &'p Pipeline<'m, E, W>,
-    work: Option<Work>,
+    works: Vec<Work, MOST_CARRIED>,
     queued: u32,
     renders: u32,
+    /// Whether this worker is counted among the hungry.
+    hungry: bool,
 }
 
 impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
     /// Gives what is carried to whoever comes first.
     fn shed(&mut self) {
-        if let Some(work) = self.work.take() {
+        while let Some(work) = self.works.pop() {
             self.queue(work);
+        }
+    }
+
+    /// Gives what is carried to those who found nothing to do, if there are any.
+    #[inline]
+    fn share(&mut self) {
+        if !self.works.is_empty() && self.pipeline.bells.somebody_is_hungry() {
+            self.shed();
+            self.announce();
+        }
+    }
+
+    /// Counts this worker among the hungry, or not.
+    #[inline]
+    fn set_hungry(&mut self, hungry: bool) {
+        if self.hungry != hungry {
+            self.hungry = hungry;
+            self.pipeline.bells.count_hungry(hungry);
         }
     }
 
     /// Gives away what is carried, and any call that this worker was woken by and has not
     /// answered: whoever called counted on it, and may sleep or have left by now.
     fn leave(&mut self) {
+        self.set_hungry(false);
         self.shed();
         // Whoever still counts this worker among the sleepers has queued its work before this.
         fence(site::FENCE_LEAVE);
@@ -72,10 +103,16 @@ impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
 impl<E: Environment, W: Waiting> Outputs for Carry<'_, '_, E, W> {
     #[inline]
     fn emit(&mut self, work: Work) {
-        if self.work.is_none() {
-            self.work = Some(work);
-        } else {
+        // One work unit is for this worker itself.
+        let shared = !self.works.is_empty() && self.pipeline.bells.somebody_is_hungry();
+        if shared || self.works.is_full() {
             self.queue(work);
+        } else {
+            let _fits = self.works.push(work);
+            // A rendering stays on top: only holders can do it.
+            if let [.., below @ Work::Render(_), top] = self.works.as_mut_slice() {
+                ::core::mem::swap(below, top);
+            }
         }
     }
 
@@ -109,7 +146,7 @@ pub struct Worker<'p, 'm, E: Environment, W: Waiting = Spin, P: Probe = NoProbe>
 
 impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
     pub(crate) fn new(pipeline: &'p Pipeline<'m, E, W>, probe: P) -> Self {
-        let carry = Carry { pipeline, work: None, queued: 0, renders: 0 };
+        let carry = Carry { pipeline, works: Vec::new(), queued: 0, renders: 0, hungry: false };
         Self { carry, stage: Stage::BroadPhase, token: None, probe }
     }
 
@@ -154,7 +191,12 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
     /// way, and the pipeline is sound: stepping may go on. Where a frame's last rendering and its
     /// swap both fail, the rendering's error is returned.
     pub fn step(&mut self, env: &E) -> Result<Step, E::Error> {
-        let Some(work) = self.next_work() else { return Ok(Step::Idle) };
+        let Some(work) = self.next_work() else {
+            self.carry.set_hungry(true);
+            return Ok(Step::Idle);
+        };
+        self.carry.set_hungry(false);
+        self.carry.share();
         self.stage = Stage::of(work);
         let pipeline = self.carry.pipeline;
         let frame = pipeline.frame_of(work);
@@ -184,14 +226,13 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         let holder = self.token.is_some();
         // Rendering first: only holders can, and a chain of carry-overs must not starve it.
         if holder
-            && !matches!(self.carry.work, Some(Work::Render(_)))
+            && !matches!(self.carry.works.last(), Some(Work::Render(_)))
             && pipeline.render_visible()
             && let Some(work) = pipeline.pop(Stage::Render)
         {
-            self.carry.shed();
             return Some(work);
         }
-        if let Some(work) = self.carry.work.take() {
+        if let Some(work) = self.carry.works.pop() {
             return Some(work);
         }
         // Visible work may be gone when it is popped: look again, but no stage more than once,
@@ -208,7 +249,7 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
     /// Whether a step would find work now, or the pipeline is at rest.
     pub fn has_cause_to_wake(&self) -> bool {
         let pipeline = self.carry.pipeline;
-        self.carry.work.is_some()
+        !self.carry.works.is_empty()
             || !pipeline.visible(self.token.is_some()).is_empty()
             || pipeline.finished()
     }

@@ -67,6 +67,11 @@ impl ContactBuffer {
         self.ends.clear();
     }
 
+    /// All records, and where among them each segment ends.
+    pub(crate) fn parts(&self) -> (&[Contact], &[usize]) {
+        (&self.records, &self.ends)
+    }
+
     /// The segments in the order in which they were stored.
     pub fn segments(&self) -> impl Iterator<Item = &[Contact]> + '_ {
         let starts = std::iter::once(0).chain(self.ends.iter().copied());

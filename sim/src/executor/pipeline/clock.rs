@@ -9,29 +9,40 @@ use dualframe_core::unit::Work;
 
 use crate::executor::StageSeconds;
 
-/// Counts the time from the end of one work unit to the end of the next towards the latter's
-/// stage: acquiring work and doing it, as the paper measures (§7.2.2). One reading of the system's
-/// clock a work unit.
+/// Counts the time from one change of stage to the next: acquiring work and doing it, as the paper
+/// measures (§7.2.2). The system's clock is read when the stage changes only: several times a work
+/// unit would be felt.
 pub(super) struct StageClock {
     last: Instant,
+    /// What the time is counted towards; `None` while there is nothing to do.
+    stage: Option<Stage>,
     stages: [Duration; 4],
     idle: Duration,
 }
 
 impl StageClock {
     pub(super) fn start() -> Self {
-        Self { last: Instant::now(), stages: Default::default(), idle: Duration::ZERO }
+        let last = Instant::now();
+        Self { last, stage: None, stages: Default::default(), idle: Duration::ZERO }
     }
 
-    fn lap(&mut self) -> Duration {
+    /// The worker turns to a stage, or to none.
+    #[inline]
+    fn turn_to(&mut self, stage: Option<Stage>) {
+        if self.stage == stage {
+            return;
+        }
         let now = Instant::now();
-        now - std::mem::replace(&mut self.last, now)
+        let time = now - std::mem::replace(&mut self.last, now);
+        match std::mem::replace(&mut self.stage, stage) {
+            Some(stage) => self.stages[stage as usize] += time,
+            None => self.idle += time,
+        }
     }
 
-    /// The worker found no work since the last work unit ended.
-    pub(super) fn idled(&mut self) {
-        let time = self.lap();
-        self.idle += time;
+    /// The worker found no work, or leaves.
+    pub(super) fn stop(&mut self) {
+        self.turn_to(None);
     }
 
     pub(super) fn add_to(&self, sum: &mut StageSeconds) {
@@ -45,8 +56,8 @@ impl StageClock {
 }
 
 impl Probe for StageClock {
-    fn end(&mut self, work: Work, _: Frame) {
-        let time = self.lap();
-        self.stages[Stage::of(work) as usize] += time;
+    #[inline]
+    fn begin(&mut self, work: Work, _: Frame) {
+        self.turn_to(Some(Stage::of(work)));
     }
 }

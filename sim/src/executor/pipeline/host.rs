@@ -1,7 +1,7 @@
 //! The stages as the core's callbacks.
 
 use std::cell::RefCell;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Instant;
 
 use dualframe_core::contacts::Contacts;
@@ -13,7 +13,8 @@ use dualframe_core::unit::UnitId;
 
 use crate::block::Block;
 use crate::executor::FrameRecord;
-use crate::interaction::{self, Contact, ContactSink, Scratch};
+use crate::executor::world::RECORDS_PER_CANDIDATE;
+use crate::interaction::{Contact, ContactBuffer, Scratch};
 use crate::message::Message;
 use crate::object::ObjectId;
 use crate::render::Renderer;
@@ -26,15 +27,12 @@ pub(super) struct Shared<'s> {
     pub(super) first_frame: u64,
     /// The unit that each object is in. Changed only between runs.
     unit_of: Vec<AtomicU32>,
-    /// What was counted in each frame that may be under way: an interaction of frame f + 2 may
-    /// run before frame f is swapped, one of frame f + 3 not.
-    counts: [[AtomicU64; 2]; 4],
 }
 
 impl<'s> Shared<'s> {
     pub(super) fn new(stages: &'s Stages, first_frame: u64, objects: usize) -> Self {
         let unit_of = (0..objects).map(|_| AtomicU32::new(0)).collect();
-        Self { stages, first_frame, unit_of, counts: Default::default() }
+        Self { stages, first_frame, unit_of }
     }
 
     /// Notes that the objects of `block` are in unit `unit`.
@@ -56,20 +54,19 @@ impl<'s> Shared<'s> {
     fn number(&self, frame: Frame) -> u64 {
         self.first_frame + u64::from(frame.0)
     }
+}
 
-    fn count(&self, frame: Frame, count: PairCount) {
-        let [candidates, collisions] = &self.counts[frame.0 as usize % 4];
-        // Relaxed: sums, read at the frame's swap, which follows all its interactions.
-        candidates.fetch_add(count.candidates, Ordering::Relaxed);
-        collisions.fetch_add(count.collisions, Ordering::Relaxed);
-    }
+/// What travels through the pipeline.
+pub(super) struct Unit {
+    pub(super) block: Block,
+    /// What the interactions with units of a greater number, and within this one, counted in the
+    /// frame last updated; so that every pair is counted once.
+    pairs: PairCount,
+}
 
-    fn take_counts(&self, frame: Frame) -> PairCount {
-        let [candidates, collisions] = &self.counts[frame.0 as usize % 4];
-        PairCount {
-            candidates: candidates.swap(0, Ordering::Relaxed),
-            collisions: collisions.swap(0, Ordering::Relaxed),
-        }
+impl From<Block> for Unit {
+    fn from(block: Block) -> Self {
+        Self { block, pairs: PairCount::default() }
     }
 }
 
@@ -83,13 +80,14 @@ pub(super) struct Parcel {
 pub(super) struct Host<'s> {
     shared: &'s Shared<'s>,
     scratch: RefCell<Scratch>,
+    results: RefCell<ContactBuffer>,
     letters: RefCell<Vec<(ObjectId, Parcel)>>,
 }
 
 impl<'s> Host<'s> {
     pub(super) fn new(shared: &'s Shared<'s>) -> Self {
-        let (scratch, letters) = (RefCell::default(), RefCell::default());
-        Self { shared, scratch, letters }
+        let results = RefCell::new(ContactBuffer::with_capacity(RECORDS_PER_CANDIDATE));
+        Self { shared, scratch: RefCell::default(), results, letters: RefCell::default() }
     }
 }
 
@@ -97,63 +95,53 @@ impl<'s> Host<'s> {
 pub(super) struct Screen<'s> {
     pub(super) renderer: &'s mut dyn Renderer,
     pub(super) on_frame: &'s mut dyn FnMut(&FrameRecord),
-}
-
-/// Puts results into the pipeline's pools.
-struct Sink<'a, 'c, 'm>(&'a mut Contacts<'c, 'm, Contact>);
-
-impl ContactSink for Sink<'_, '_, '_> {
-    fn push(&mut self, segment: &[Contact]) -> Result<(), interaction::TableFull> {
-        let full = |TableFull { capacity, needed, .. }| interaction::TableFull { capacity, needed };
-        self.0.push(segment).map_err(full)
-    }
+    /// What was counted in the frame being rendered.
+    pub(super) pairs: PairCount,
 }
 
 impl<'s> Environment for Host<'s> {
-    type Object = Block;
-    type Interaction = ();
+    type Object = Unit;
+    type Interaction = PairCount;
     type Contact = Contact;
     type Message = Parcel;
     type Renderer = Screen<'s>;
     type Error = TableFull;
 
-    fn broad_phase(&self, a: &Block, b: &Block) -> bool {
-        self.shared.stages.broad_phase(a, b)
+    fn broad_phase(&self, a: &Unit, b: &Unit) -> bool {
+        self.shared.stages.broad_phase(&a.block, &b.block)
     }
 
-    fn interacts_within(&self, block: &Block) -> bool {
-        self.shared.stages.interacts_within(block)
+    fn interacts_within(&self, unit: &Unit) -> bool {
+        self.shared.stages.interacts_within(&unit.block)
     }
 
     fn interact(
         &self,
         pair: Pair,
-        a: &Block,
-        b: &Block,
-        (): &mut (),
+        a: &Unit,
+        b: &Unit,
+        count: &mut PairCount,
         contacts: &mut Contacts<'_, '_, Contact>,
     ) -> Result<(), TableFull> {
         let (stages, scratch) = (self.shared.stages, &mut *self.scratch.borrow_mut());
-        let sink = &mut Sink(contacts);
+        let results = &mut *self.results.borrow_mut();
+        results.clear();
         let counted = if pair.ends[0] == pair.ends[1] {
-            stages.interact_within(a, scratch, sink)
+            stages.interact_within(&a.block, scratch, results)
         } else {
-            stages.interact(a, b, scratch, sink)
+            stages.interact(&a.block, &b.block, scratch, results)
         };
-        let count = counted.map_err(|interaction::TableFull { capacity, needed }| TableFull {
-            table: dualframe_core::error::Table::Contacts,
-            capacity,
-            needed,
-        })?;
-        self.shared.count(pair.frame, count);
-        Ok(())
+        // A buffer in growing memory is never full.
+        *count = counted.unwrap_or_default();
+        let (records, ends) = results.parts();
+        contacts.push_segments(records, ends)
     }
 
     fn update(
         &self,
-        _: UnitId,
+        id: UnitId,
         frame: Frame,
-        block: &mut Block,
+        unit: &mut Unit,
         inputs: &mut Inputs<'_, '_, Self>,
     ) -> Result<(), TableFull> {
         let shared = self.shared;
@@ -163,8 +151,14 @@ impl<'s> Environment for Host<'s> {
             letters.push((ObjectId(from.sender), parcel));
         }
         let mail = letters.iter().map(|(from, parcel)| (parcel.to, *from, &parcel.message));
-        let segments = inputs.interactions().flat_map(|interaction| interaction.contacts);
-        segments.for_each(|segment| block.receive(segment));
+        let Unit { block, pairs } = unit;
+        *pairs = PairCount::default();
+        for interaction in inputs.interactions() {
+            if interaction.other >= id {
+                *pairs += *interaction.state;
+            }
+            interaction.contacts.for_each(|segment| block.receive(segment));
+        }
         let mut outcome = Ok(());
         let mut post = |from: ObjectId, to: ObjectId, message| {
             // A letter to nobody is lost, as `Input::post` says.
@@ -181,17 +175,18 @@ impl<'s> Environment for Host<'s> {
         &self,
         _: UnitId,
         _: Frame,
-        block: &Block,
+        unit: &Unit,
         screen: &mut Screen<'s>,
     ) -> Result<(), TableFull> {
-        self.shared.stages.render(block, screen.renderer);
+        screen.pairs += unit.pairs;
+        self.shared.stages.render(&unit.block, screen.renderer);
         Ok(())
     }
 
     fn swap(&self, frame: Frame, screen: &mut Screen<'s>) -> Result<(), TableFull> {
         let number = self.shared.number(frame);
         screen.renderer.swap(number);
-        let pairs = self.shared.take_counts(frame);
+        let pairs = std::mem::take(&mut screen.pairs);
         (screen.on_frame)(&FrameRecord { frame: number, swapped: Instant::now(), pairs });
         Ok(())
     }

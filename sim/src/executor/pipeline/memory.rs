@@ -7,11 +7,11 @@ use dualframe_core::ring::QueueSlot;
 use dualframe_core::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
 use dualframe_core::unit::UnitId;
 
-use super::host::Parcel;
+use super::host::{Parcel, Unit};
 use crate::block::{Block, CONTACTS_PER_OBJECT};
 use crate::interaction::Contact;
 use crate::object::Object;
-use crate::stages::Stages;
+use crate::stages::{PairCount, Stages};
 
 /// Contact records a frame that there is room for at least, however few the objects.
 const FEWEST_CONTACTS: usize = 4_096;
@@ -25,8 +25,8 @@ const CANDIDATES_PER_BLOCK: usize = 128;
 
 /// All tables, sized for an environment, kept from run to run.
 pub(super) struct Tables {
-    units: Vec<UnitSlot<Block>>,
-    interactions: Vec<InteractionSlot<()>>,
+    units: Vec<UnitSlot<Unit>>,
+    interactions: Vec<InteractionSlot<PairCount>>,
     contacts: Vec<ContactSlot<Contact>>,
     segments: Vec<SegmentSlot>,
     letters: Vec<LetterSlot<Parcel>>,
@@ -34,7 +34,7 @@ pub(super) struct Tables {
 }
 
 impl Tables {
-    pub(super) fn new(blocks: &[Block], interactions: Vec<InteractionSlot<()>>) -> Self {
+    pub(super) fn new(blocks: &[Block], interactions: Vec<InteractionSlot<PairCount>>) -> Self {
         let objects: usize = blocks.iter().map(|block| block.objects().len()).sum();
         let contacts = 2 * (objects * CONTACTS_PER_OBJECT + FEWEST_CONTACTS);
         let letters = objects * LETTERS_PER_OBJECT + FEWEST_LETTERS;
@@ -53,18 +53,19 @@ impl Tables {
     pub(super) fn load(&mut self, blocks: &mut Vec<Block>) {
         self.units.extend(blocks.drain(..).map(|block| {
             let solitary = block.objects().iter().all(Object::is_solitary);
-            if solitary { UnitSlot::solitary(block) } else { UnitSlot::new(block) }
+            let unit = Unit::from(block);
+            if solitary { UnitSlot::solitary(unit) } else { UnitSlot::new(unit) }
         }));
     }
 
     /// Moves the blocks back.
     pub(super) fn unload(&mut self, blocks: &mut Vec<Block>) {
-        blocks.extend(self.units.drain(..).map(UnitSlot::into_object));
+        blocks.extend(self.units.drain(..).map(|slot| slot.into_object().block));
     }
 
     pub(super) fn lend<E>(&mut self) -> Memory<'_, E>
     where
-        E: Environment<Object = Block, Interaction = (), Contact = Contact, Message = Parcel>,
+        E: Environment<Object = Unit, Interaction = PairCount, Contact = Contact, Message = Parcel>,
     {
         Memory {
             units: &mut self.units,
@@ -104,23 +105,26 @@ fn filled<T>(count: usize, slot: impl Fn() -> T) -> Vec<T> {
 }
 
 /// Room for the pairs of blocks that a frame may find near each other.
-pub(super) fn spare_interactions(blocks: usize) -> Vec<InteractionSlot<()>> {
+pub(super) fn spare_interactions(blocks: usize) -> Vec<InteractionSlot<PairCount>> {
     let candidates = if blocks <= ALL_PAIRS_BLOCKS {
         blocks * (blocks + 1) / 2
     } else {
         blocks * CANDIDATES_PER_BLOCK
     };
-    filled(2 * candidates, || InteractionSlot::spare(()))
+    filled(2 * candidates, || InteractionSlot::spare(PairCount::default()))
 }
 
 /// Every pair of blocks that an interaction is modelled for.
-pub(super) fn modelled_interactions(stages: &Stages, blocks: &[Block]) -> Vec<InteractionSlot<()>> {
+pub(super) fn modelled_interactions(
+    stages: &Stages,
+    blocks: &[Block],
+) -> Vec<InteractionSlot<PairCount>> {
     let mut interactions = Vec::new();
     for (first, a) in blocks.iter().enumerate() {
         for (second, b) in blocks.iter().enumerate().skip(first + 1) {
             if stages.rules.apply(a.groups(), b.groups()) {
                 let ends = [first, second].map(|index| UnitId(index as u32));
-                interactions.push(InteractionSlot::between(ends[0], ends[1], ()));
+                interactions.push(InteractionSlot::between(ends[0], ends[1], PairCount::default()));
             }
         }
     }

@@ -27,7 +27,7 @@ use crate::object::{Object, ObjectId};
 use crate::pool::{Crew, Pool};
 use crate::render::Renderer;
 use crate::scene::Scene;
-use crate::stages::Stages;
+use crate::stages::{PairCount, Stages};
 
 /// Advances an environment by the pipeline. The calling thread is worker number 0 and holds the
 /// render token.
@@ -102,8 +102,12 @@ impl PipelineExecutor {
             mail: &mut self.mail,
             most_contacts,
         };
-        let (done, hiring) =
-            context.run(frames, pipeline, regrouping, Screen { renderer, on_frame });
+        let (done, hiring) = context.run(
+            frames,
+            pipeline,
+            regrouping,
+            Screen { renderer, on_frame, pairs: PairCount::default() },
+        );
         let report = report.into_inner().unwrap_or_else(PoisonError::into_inner);
         self.tables.unload(&mut self.blocks);
         self.frame += done;

@@ -61,11 +61,11 @@ impl Regrouping<'_> {
         pipeline: &mut SimPipeline<'_, '_>,
     ) -> Result<(), TableFull> {
         let Some(blocking) = self.blocking.as_deref_mut() else { return Ok(()) };
-        pipeline.objects_mut().for_each(|block| blocking.drain(block));
+        pipeline.objects_mut().for_each(|unit| blocking.drain(&mut unit.block));
         blocking.split();
-        for (unit, block) in pipeline.objects_mut().enumerate() {
-            blocking.fill(unit, block);
-            shared.locate(unit, block);
+        for (index, unit) in pipeline.objects_mut().enumerate() {
+            blocking.fill(index, &mut unit.block);
+            shared.locate(index, &unit.block);
         }
         self.take_mail(pipeline);
         self.post_mail(shared, pipeline)
@@ -106,8 +106,8 @@ impl<'s> Context<'s, '_> {
         mut regrouping: Regrouping<'_>,
         mut screen: Screen<'s>,
     ) -> (u64, io::Result<()>) {
-        for (unit, block) in pipeline.objects_mut().enumerate() {
-            self.shared.locate(unit, block);
+        for (index, unit) in pipeline.objects_mut().enumerate() {
+            self.shared.locate(index, &unit.block);
         }
         let mut outcome = regrouping.post_mail(self.shared, &pipeline);
         let pipeline = RwLock::new(pipeline);
@@ -209,8 +209,8 @@ impl<'s> Context<'s, '_> {
                 Ok(Step::Worked(_)) => {}
                 Ok(Step::Idle) if pipeline.finished() => break,
                 Ok(Step::Idle) => {
+                    worker.probe().stop();
                     self.crew.idle(self.pool, &worker);
-                    worker.probe().idled();
                 }
                 Err(full) => self.fail(full),
             }
@@ -227,9 +227,10 @@ impl<'s> Context<'s, '_> {
         }
     }
 
-    fn note(self, index: usize, clock: &StageClock) {
+    fn note(self, index: usize, clock: &mut StageClock) {
         let mut report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(seconds) = report.seconds.get_mut(index) {
+            clock.stop();
             clock.add_to(seconds);
         }
     }
