@@ -14,6 +14,7 @@ use crate::geometry::{Geometry, LANES, Lanes};
 use crate::interaction::Contact;
 use crate::message::Message;
 use crate::object::ObjectId;
+use crate::simd::{Quad, Simd};
 
 pub use fixed::Fixed;
 pub use mass_spring::{MassSpring, MassSpringError};
@@ -44,6 +45,7 @@ pub struct Input<'a> {
     pub time_step: f32,
     /// The acceleration of gravity, in metres per second squared.
     pub gravity: Vec3,
+    pub(crate) simd: Simd,
     pub(crate) object: ObjectId,
     pub(crate) segments: &'a [Segment],
     pub(crate) records: &'a [Contact],
@@ -76,17 +78,19 @@ pub(crate) struct Segment {
 /// Memory that the updates of a block's objects use one after the other.
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
+    /// The forces on chunks of nodes, in newtons.
     forces: [Vec<Lanes>; 3],
+    /// Where positions and velocities are looked up.
+    tables: [Vec<Quad>; 2],
 }
 
 impl Workspace {
-    /// Room for the forces on so many chunks of nodes, in newtons, of any content.
-    pub(crate) fn forces(&mut self, chunks: usize) -> [&mut [Lanes]; 3] {
-        self.forces.each_mut().map(|component| {
+    /// Makes room for the forces on so many chunks of nodes.
+    pub(crate) fn reserve(&mut self, chunks: usize) {
+        for component in &mut self.forces {
             if component.len() < chunks {
                 component.resize(chunks, [0.0; LANES]);
             }
-            &mut component[..chunks]
-        })
+        }
     }
 }

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::bounds::Bounds;
 use super::topology::Topology;
-use super::vectors::{LANES, Lanes, Vectors, lane_sum};
+use super::vectors::{Lanes, Vectors, in_lanes, lane_sum};
 
 /// Why a mesh cannot be built.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
@@ -165,6 +165,7 @@ impl Mesh {
     pub(crate) fn kernel_parts(&mut self) -> KernelParts<'_> {
         KernelParts {
             topology: &self.topology,
+            present: self.topology.present(),
             positions: &mut self.positions,
             velocities: &mut self.velocities,
             masses: &self.masses,
@@ -176,16 +177,10 @@ impl Mesh {
 /// A mesh, taken apart for a kernel.
 pub(crate) struct KernelParts<'a> {
     pub(crate) topology: &'a Topology,
+    /// 1 for each node, 0 for the padding.
+    pub(crate) present: &'a [Lanes],
     pub(crate) positions: &'a mut Vectors,
     pub(crate) velocities: &'a mut Vectors,
     pub(crate) masses: &'a [Lanes],
     pub(crate) inverse_masses: &'a [Lanes],
-}
-
-fn in_lanes(values: impl Iterator<Item = f32>, len: usize) -> Vec<Lanes> {
-    let mut lanes = vec![[0.0; LANES]; len.div_ceil(LANES)];
-    for (lane, value) in lanes.as_flattened_mut().iter_mut().zip(values) {
-        *lane = value;
-    }
-    lanes
 }
