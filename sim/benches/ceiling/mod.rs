@@ -4,12 +4,20 @@ use dualframe_sim::geometry::Topology;
 use dualframe_sim::simd::Instructions;
 use glam::Vec3;
 
+/// A node's inverse mass, in 1/kg.
+const INVERSE_MASS: f32 = 100.0;
 /// Bodies, one in each lane.
 const LANES: usize = 16;
 /// One number of every body.
 type Lanes = [f32; LANES];
 /// One vector of every body.
-type Node = [Lanes; 3];
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Node([Lanes; 3]);
+
+impl Node {
+    const ZERO: Self = Self([[0.0; LANES]; 3]);
+}
 
 pub(crate) struct Ceiling {
     springs: Vec<([usize; 2], f32)>,
@@ -32,8 +40,8 @@ impl Ceiling {
     ) -> Self {
         let springs = topology.springs().iter();
         let springs = springs.map(|spring| (spring.nodes.map(|node| node as usize), spring.rest));
-        let node = |position: &Vec3| position.to_array().map(|component| [component; LANES]);
-        let none = vec![[[0.0; LANES]; 3]; positions.len()];
+        let node = |position: &Vec3| Node(position.to_array().map(|part| [part; LANES]));
+        let none = vec![Node::ZERO; positions.len()];
         Self {
             springs: springs.collect(),
             center_rest: topology.center_rest().expect("springs to the centre").to_vec(),
@@ -74,66 +82,57 @@ fn with_avx512(ceiling: &mut Ceiling) {
 
 #[inline(always)]
 fn integrate(bodies: &mut Ceiling) {
+    let Ceiling { springs, center_rest, positions, velocities, forces, .. } = bodies;
     for _ in 0..bodies.substeps {
-        bodies.forces.fill([[0.0; LANES]; 3]);
-        for &([a, b], rest) in &bodies.springs {
-            let force = pull(&bodies.positions[a], &bodies.positions[b], rest, bodies.stiffness);
-            for axis in 0..3 {
-                for lane in 0..LANES {
-                    bodies.forces[a][axis][lane] += force[axis][lane];
-                    bodies.forces[b][axis][lane] -= force[axis][lane];
-                }
-            }
+        forces.fill(Node::ZERO);
+        for &([a, b], rest) in springs.iter() {
+            let force = pull(&positions[a], &positions[b], rest, bodies.stiffness);
+            add(&mut forces[a], &force, 1.0);
+            add(&mut forces[b], &force, -1.0);
         }
-        let center = mean(&bodies.positions);
-        let mut total = [[0.0; LANES]; 3];
-        for (node, &rest) in bodies.center_rest.iter().enumerate() {
-            let force = pull(&bodies.positions[node], &center, rest, bodies.stiffness);
-            for axis in 0..3 {
-                for lane in 0..LANES {
-                    bodies.forces[node][axis][lane] += force[axis][lane];
-                    total[axis][lane] += force[axis][lane];
-                }
-            }
+        let share = 1.0 / positions.len() as f32;
+        let mut center = Node::ZERO;
+        for position in positions.iter() {
+            add(&mut center, position, share);
         }
-        let share = -1.0 / bodies.positions.len() as f32;
-        let nodes = bodies.positions.iter_mut().zip(&mut bodies.velocities).zip(&bodies.forces);
+        let mut total = Node::ZERO;
+        for ((position, force), &rest) in
+            positions.iter().zip(forces.iter_mut()).zip(center_rest.iter())
+        {
+            let pulled = pull(position, &center, rest, bodies.stiffness);
+            add(force, &pulled, 1.0);
+            add(&mut total, &pulled, -share);
+        }
+        let nodes = positions.iter_mut().zip(velocities.iter_mut()).zip(forces.iter_mut());
         for ((position, velocity), force) in nodes {
-            for axis in 0..3 {
-                for lane in 0..LANES {
-                    let force = force[axis][lane] + total[axis][lane] * share;
-                    velocity[axis][lane] += force * 100.0 * bodies.step;
-                    position[axis][lane] += velocity[axis][lane] * bodies.step;
-                }
-            }
+            add(force, &total, 1.0);
+            add(velocity, force, INVERSE_MASS * bodies.step);
+            add(position, velocity, bodies.step);
+        }
+    }
+}
+
+/// Adds a vector times a number.
+#[inline(always)]
+fn add(to: &mut Node, vector: &Node, factor: f32) {
+    for axis in 0..3 {
+        for lane in 0..LANES {
+            to.0[axis][lane] += vector.0[axis][lane] * factor;
         }
     }
 }
 
 /// The force of a spring on its first end.
 #[inline(always)]
-fn pull(a: &Node, b: &Node, rest: f32, stiffness: f32) -> Node {
-    let mut force = [[0.0; LANES]; 3];
+fn pull(Node(a): &Node, Node(b): &Node, rest: f32, stiffness: f32) -> Node {
+    let mut force = Node::ZERO;
     for lane in 0..LANES {
         let way = [b[0][lane] - a[0][lane], b[1][lane] - a[1][lane], b[2][lane] - a[2][lane]];
         let square = way[0] * way[0] + way[1] * way[1] + way[2] * way[2] + 1e-30;
         let pull = stiffness * (1.0 - rest / square.sqrt());
         for axis in 0..3 {
-            force[axis][lane] = pull * way[axis];
+            force.0[axis][lane] = pull * way[axis];
         }
     }
     force
-}
-
-#[inline(always)]
-fn mean(nodes: &[Node]) -> Node {
-    let mut sum = [[0.0; LANES]; 3];
-    for node in nodes {
-        for axis in 0..3 {
-            for lane in 0..LANES {
-                sum[axis][lane] += node[axis][lane];
-            }
-        }
-    }
-    sum.map(|lanes| lanes.map(|value| value / nodes.len() as f32))
 }

@@ -119,8 +119,7 @@ impl Behavior for MassSpring {
             }
         }
         let parts = mesh.kernel_parts();
-        let chunks = parts.present.len();
-        input.workspace.reserve(chunks);
+        let chunks = parts.topology.present().len();
         input.simd.for_look_up(chunks).run(Advance {
             parts,
             workspace: input.workspace,

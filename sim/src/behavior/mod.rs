@@ -10,11 +10,11 @@ use std::hash::Hasher;
 
 use glam::Vec3;
 
-use crate::geometry::{Geometry, LANES, Lanes};
+use crate::geometry::Geometry;
 use crate::interaction::Contact;
 use crate::message::Message;
 use crate::object::ObjectId;
-use crate::simd::{Quad, Simd};
+use crate::simd::{Lanes3, Quad, Simd};
 
 pub use fixed::Fixed;
 pub use mass_spring::{MassSpring, MassSpringError};
@@ -78,19 +78,12 @@ pub(crate) struct Segment {
 /// Memory that the updates of a block's objects use one after the other.
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
-    /// The forces on chunks of nodes, in newtons.
-    forces: [Vec<Lanes>; 3],
+    /// Of one body, in metres.
+    positions: Vec<Lanes3>,
+    /// Of one body, in metres per second.
+    velocities: Vec<Lanes3>,
+    /// What the springs to the centre pull at each node, in newtons.
+    pulled: Vec<Lanes3>,
     /// Where positions and velocities are looked up.
     tables: [Vec<Quad>; 2],
-}
-
-impl Workspace {
-    /// Makes room for the forces on so many chunks of nodes.
-    pub(crate) fn reserve(&mut self, chunks: usize) {
-        for component in &mut self.forces {
-            if component.len() < chunks {
-                component.resize(chunks, [0.0; LANES]);
-            }
-        }
-    }
 }

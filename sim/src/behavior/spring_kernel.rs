@@ -1,22 +1,21 @@
 //! The arithmetic of mass–spring bodies: a whole frame of one body, in lanes of nodes.
 //!
 //! Every set of instructions comes to the same bits, because each does these operations in this order:
-//! 1. The centre is the lanes' sums over the chunks of nodes in ascending order, [`fold`]ed, over the
-//!    number of nodes.
-//! 2. A node's force is 0, plus the pulls of its own springs in the order of the slots of its chunk,
-//!    plus the pull to the centre.
-//! 3. The springs to the centre pull at all nodes alike by the sum of their forces, lane by lane over
-//!    the chunks, then folded, times −1 over the number of nodes.
-//! 4. A velocity changes by ((force + 3. + mass · gravity) · inverse mass) · time, then the position by
-//!    velocity · time.
+//! 1. The centre is the lanes' sums over the chunks of nodes in ascending order, [`fold`]ed, times the
+//!    inverse of the number of nodes.
+//! 2. The springs to the centre pull at all nodes alike by the sum of their forces, lane by lane over
+//!    the chunks, then folded, times minus that inverse.
+//! 3. A node's force is 0, plus the pulls of its own springs in the order of the slots of its chunk,
+//!    plus the pull to the centre, plus 2., plus mass · gravity.
+//! 4. Its velocity changes by (force · inverse mass) · time, then its position by velocity · time.
 //!
 //! Both ends of a spring compute its pull: gathering is cheaper than scattering, and needs no order.
 //!
 //! [`fold`]: crate::simd::fold
 
 use super::Workspace;
-use crate::geometry::{KernelParts, Lanes, lane_sum};
-use crate::simd::{Isa, Kernel};
+use crate::geometry::{KernelParts, Lanes, Slot};
+use crate::simd::{Isa, Kernel, Lanes3};
 
 /// The least squared length of a spring, m², which keeps a spring without length from dividing by 0.
 /// It is far below the rounding error of any other.
@@ -45,19 +44,42 @@ impl Kernel for Advance<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        let Self { mut parts, workspace, gravity, time, .. } = self;
+        let Self { parts, workspace, .. } = self;
+        let chunks = parts.topology.present().len();
+        gather(&mut workspace.positions, &parts.positions.components, chunks);
+        gather(&mut workspace.velocities, &parts.velocities.components, chunks);
+        workspace.pulled.resize(chunks, Lanes3::default());
         if self.damping > 0.0 {
             let law = Dashpot { damping: isa.splat(self.damping) };
-            let shared = compute(isa, &parts, workspace, law, law);
-            kick(isa, &mut parts, workspace, shared, [0.0; 3], time);
+            let whole = Step { gravity: [0.0; 3], time: self.time, drifts: false };
+            whole.advance(isa, &parts, workspace, law, law);
         }
-        let step = time / self.substeps as f32;
+        let time = self.time / self.substeps as f32;
         let edges = Elastic { stiffness: isa.splat(self.stiffness), one: isa.splat(1.0) };
         let to_center = Elastic { stiffness: isa.splat(self.center_stiffness), ..edges };
+        let step = Step { gravity: self.gravity, time, drifts: true };
         for _ in 0..self.substeps {
-            let shared = compute(isa, &parts, workspace, edges, to_center);
-            kick(isa, &mut parts, workspace, shared, gravity, step);
-            drift(isa, &mut parts, step);
+            step.advance(isa, &parts, workspace, edges, to_center);
+        }
+        scatter(&workspace.positions, &mut parts.positions.components);
+        scatter(&workspace.velocities, &mut parts.velocities.components);
+    }
+}
+
+/// Puts the components of each chunk side by side.
+#[inline(always)]
+fn gather(chunks: &mut Vec<Lanes3>, components: &[Vec<Lanes>; 3], len: usize) {
+    let [x, y, z] = components.each_ref().map(|component| &component[..len]);
+    chunks.clear();
+    chunks.extend(x.iter().zip(y).zip(z).map(|((&x, &y), &z)| Lanes3([x, y, z])));
+}
+
+/// The other way.
+#[inline(always)]
+fn scatter(chunks: &[Lanes3], components: &mut [Vec<Lanes>; 3]) {
+    for (axis, component) in components.iter_mut().enumerate() {
+        for (lanes, chunk) in component.iter_mut().zip(chunks) {
+            *lanes = chunk.0[axis];
         }
     }
 }
@@ -134,118 +156,155 @@ fn minus<I: Isa>(isa: I, a: [I::Vector; 3], b: [I::Vector; 3]) -> [I::Vector; 3]
 }
 
 #[inline(always)]
-fn load<I: Isa>(isa: I, components: [&[Lanes]; 3], chunk: usize) -> [I::Vector; 3] {
-    let [x, y, z] = components;
-    [isa.load(&x[chunk]), isa.load(&y[chunk]), isa.load(&z[chunk])]
+fn load<I: Isa>(isa: I, lanes: &Lanes3) -> [I::Vector; 3] {
+    let [x, y, z] = &lanes.0;
+    [isa.load(x), isa.load(y), isa.load(z)]
 }
 
-/// Leaves the force on each node in the workspace, and returns the one on all nodes alike: their share
-/// of what the springs to the centre pull at the centre. All in newtons.
 #[inline(always)]
-fn compute<I: Isa, L: Law<I>>(
+fn store<I: Isa>(isa: I, vectors: [I::Vector; 3], lanes: &mut Lanes3) {
+    for axis in 0..3 {
+        isa.store(vectors[axis], &mut lanes.0[axis]);
+    }
+}
+
+// Not by `map`: what the library does not inline is compiled for the baseline.
+#[inline(always)]
+fn splat<I: Isa>(isa: I, vector: [f32; 3]) -> [I::Vector; 3] {
+    [isa.splat(vector[0]), isa.splat(vector[1]), isa.splat(vector[2])]
+}
+
+/// One step with one kind of force.
+#[derive(Clone, Copy)]
+struct Step {
+    /// In metres per second squared.
+    gravity: [f32; 3],
+    /// In seconds.
+    time: f32,
+    /// Whether positions change too.
+    drifts: bool,
+}
+
+impl Step {
+    /// Makes the step, with one law for the springs between nodes and another for those to the centre.
+    #[inline(always)]
+    fn advance<I: Isa, L: Law<I>>(
+        self,
+        isa: I,
+        parts: &KernelParts<'_>,
+        workspace: &mut Workspace,
+        edges: L,
+        to_center: L,
+    ) {
+        let shared = splat(isa, pull_to_center(isa, parts, workspace, to_center));
+        let Workspace { positions, velocities, pulled, tables } = workspace;
+        let [of_positions, of_velocities] = tables;
+        let chunks = positions.len();
+        let (velocities, pulled) = (&mut velocities[..chunks], &pulled[..chunks]);
+        let (masses, inverse_masses) = (&parts.masses[..chunks], &parts.inverse_masses[..chunks]);
+        // From here on the nodes move, but what is looked up is where they were.
+        let near = isa.table(positions, of_positions);
+        let near_velocity =
+            if L::NEEDS_VELOCITY { isa.table(velocities, of_velocities) } else { near };
+        let gravity = splat(isa, self.gravity);
+        let time = isa.splat(self.time);
+        for chunk in 0..chunks {
+            let mut position = load(isa, &positions[chunk]);
+            let mut velocity = load(isa, &velocities[chunk]);
+            let slots = parts.topology.slots(chunk);
+            let own = edge_forces(isa, slots, [near, near_velocity], position, velocity, edges);
+            let to_center = load(isa, &pulled[chunk]);
+            let (mass, inverse_mass) = (isa.load(&masses[chunk]), isa.load(&inverse_masses[chunk]));
+            for axis in 0..3 {
+                let springs = isa.add(isa.add(own[axis], to_center[axis]), shared[axis]);
+                // Gravity as a force, so that it moves neither held nodes nor the padding.
+                let force = isa.add(springs, isa.mul(mass, gravity[axis]));
+                let change = isa.mul(isa.mul(force, inverse_mass), time);
+                velocity[axis] = isa.add(velocity[axis], change);
+                position[axis] = isa.add(position[axis], isa.mul(velocity[axis], time));
+            }
+            store(isa, velocity, &mut velocities[chunk]);
+            if self.drifts {
+                store(isa, position, &mut positions[chunk]);
+            }
+        }
+    }
+}
+
+/// The forces of the springs between nodes on the nodes of one chunk. The tables are those of positions
+/// and, where the law asks for them, velocities.
+#[inline(always)]
+fn edge_forces<I: Isa, L: Law<I>>(
+    isa: I,
+    slots: &[Slot],
+    [near, near_velocity]: [I::Table<'_>; 2],
+    position: [I::Vector; 3],
+    velocity: [I::Vector; 3],
+    law: L,
+) -> [I::Vector; 3] {
+    let mut force = [isa.splat(0.0); 3];
+    for slot in slots {
+        let way = minus(isa, isa.look_up(near, &slot.neighbour), position);
+        let relative = if L::NEEDS_VELOCITY {
+            minus(isa, isa.look_up(near_velocity, &slot.neighbour), velocity)
+        } else {
+            way
+        };
+        let pull = law.pull(isa, way, relative, isa.load(&slot.rest));
+        for axis in 0..3 {
+            force[axis] = isa.add(force[axis], isa.mul(pull, way[axis]));
+        }
+    }
+    force
+}
+
+/// Leaves what the springs to the centre pull at each node in the workspace, and returns the force on
+/// all nodes alike: their share of what is pulled at the centre. All in newtons.
+#[inline(always)]
+fn pull_to_center<I: Isa, L: Law<I>>(
     isa: I,
     parts: &KernelParts<'_>,
     workspace: &mut Workspace,
-    edges: L,
-    to_center: L,
+    law: L,
 ) -> [f32; 3] {
-    let chunks = parts.present.len();
-    let [px, py, pz] = parts.positions.components.each_ref();
-    let positions = [&px[..chunks], &py[..chunks], &pz[..chunks]];
-    let [vx, vy, vz] = parts.velocities.components.each_ref();
-    let velocities = [&vx[..chunks], &vy[..chunks], &vz[..chunks]];
-    let Workspace { forces, tables } = workspace;
-    let [for_positions, for_velocities] = tables;
-    let near = isa.table(positions, for_positions);
-    let near_velocity =
-        if L::NEEDS_VELOCITY { isa.table(velocities, for_velocities) } else { near };
-    let nodes = parts.topology.nodes() as f32;
-    let center = mean(isa, positions, nodes);
+    let Some(rest) = parts.topology.center_lanes() else { return [0.0; 3] };
+    let Workspace { positions, velocities, pulled, .. } = workspace;
+    let chunks = positions.len();
+    let (velocities, pulled) = (&velocities[..chunks], &mut pulled[..chunks]);
+    let (rest, present) = (&rest[..chunks], &parts.topology.present()[..chunks]);
+    let share = 1.0 / parts.topology.nodes() as f32;
+    let center = mean(isa, positions, share);
     let center_velocity =
-        if L::NEEDS_VELOCITY { mean(isa, velocities, nodes) } else { [isa.splat(0.0); 3] };
-    let center_rest = parts.topology.center_lanes();
+        if L::NEEDS_VELOCITY { mean(isa, velocities, share) } else { [isa.splat(0.0); 3] };
     let mut total = [isa.splat(0.0); 3];
     for chunk in 0..chunks {
-        let own = load(isa, positions, chunk);
-        let own_velocity = if L::NEEDS_VELOCITY { load(isa, velocities, chunk) } else { own };
-        let mut force = [isa.splat(0.0); 3];
-        for slot in parts.topology.slots(chunk) {
-            let way = minus(isa, isa.look_up(near, &slot.neighbour), own);
-            let relative = if L::NEEDS_VELOCITY {
-                minus(isa, isa.look_up(near_velocity, &slot.neighbour), own_velocity)
-            } else {
-                way
-            };
-            let pull = edges.pull(isa, way, relative, isa.load(&slot.rest));
-            for axis in 0..3 {
-                force[axis] = isa.add(force[axis], isa.mul(pull, way[axis]));
-            }
-        }
-        if let Some(rest) = center_rest {
-            let way = minus(isa, center, own);
-            let relative = minus(isa, center_velocity, own_velocity);
-            let pull = to_center.pull(isa, way, relative, isa.load(&rest[chunk]));
-            // Nothing pulls at the padding.
-            let pull = isa.mul(isa.load(&parts.present[chunk]), pull);
-            for axis in 0..3 {
-                let pulled = isa.mul(pull, way[axis]);
-                force[axis] = isa.add(force[axis], pulled);
-                total[axis] = isa.add(total[axis], pulled);
-            }
-        }
+        let way = minus(isa, center, load(isa, &positions[chunk]));
+        let relative = if L::NEEDS_VELOCITY {
+            minus(isa, center_velocity, load(isa, &velocities[chunk]))
+        } else {
+            way
+        };
+        // Nothing pulls at the padding.
+        let pull = law.pull(isa, way, relative, isa.load(&rest[chunk]));
+        let pull = isa.mul(isa.load(&present[chunk]), pull);
+        let forces = [isa.mul(pull, way[0]), isa.mul(pull, way[1]), isa.mul(pull, way[2])];
         for axis in 0..3 {
-            isa.store(force[axis], &mut forces[axis][chunk]);
+            total[axis] = isa.add(total[axis], forces[axis]);
         }
+        store(isa, forces, &mut pulled[chunk]);
     }
-    let share = -1.0 / nodes;
-    [isa.sum(total[0]) * share, isa.sum(total[1]) * share, isa.sum(total[2]) * share]
+    [isa.sum(total[0]) * -share, isa.sum(total[1]) * -share, isa.sum(total[2]) * -share]
 }
 
-/// The mean of all nodes, in every lane.
+/// The mean of all nodes, in every lane; `share` is the inverse of their number.
 #[inline(always)]
-fn mean<I: Isa>(isa: I, components: [&[Lanes]; 3], nodes: f32) -> [I::Vector; 3] {
-    let [x, y, z] = components;
-    let mean = |lanes| isa.splat(lane_sum(lanes) / nodes);
-    [mean(x), mean(y), mean(z)]
-}
-
-/// Changes the velocities by the forces in the workspace, what is on all nodes alike (N), and gravity
-/// (m/s²) over a time (s).
-#[inline(always)]
-fn kick<I: Isa>(
-    isa: I,
-    parts: &mut KernelParts<'_>,
-    workspace: &Workspace,
-    shared: [f32; 3],
-    gravity: [f32; 3],
-    time: f32,
-) {
-    let chunks = parts.present.len();
-    let (masses, inverse_masses) = (&parts.masses[..chunks], &parts.inverse_masses[..chunks]);
-    let time = isa.splat(time);
-    for axis in 0..3 {
-        let velocities = &mut parts.velocities.components[axis][..chunks];
-        let forces = &workspace.forces[axis][..chunks];
-        let (shared, gravity) = (isa.splat(shared[axis]), isa.splat(gravity[axis]));
-        for chunk in 0..chunks {
-            // Gravity as a force, so that it moves neither held nodes nor the padding.
-            let weight = isa.mul(isa.load(&masses[chunk]), gravity);
-            let total = isa.add(isa.add(isa.load(&forces[chunk]), shared), weight);
-            let change = isa.mul(isa.mul(total, isa.load(&inverse_masses[chunk])), time);
-            isa.store(isa.add(isa.load(&velocities[chunk]), change), &mut velocities[chunk]);
+fn mean<I: Isa>(isa: I, chunks: &[Lanes3], share: f32) -> [I::Vector; 3] {
+    let mut sum = [isa.splat(0.0); 3];
+    for chunk in chunks {
+        let vectors = load(isa, chunk);
+        for axis in 0..3 {
+            sum[axis] = isa.add(sum[axis], vectors[axis]);
         }
     }
-}
-
-/// Moves the nodes with their velocities for a time (s).
-#[inline(always)]
-fn drift<I: Isa>(isa: I, parts: &mut KernelParts<'_>, time: f32) {
-    let time = isa.splat(time);
-    for axis in 0..3 {
-        let positions = parts.positions.components[axis].iter_mut();
-        for (position, velocity) in positions.zip(&parts.velocities.components[axis]) {
-            let way = isa.mul(isa.load(velocity), time);
-            isa.store(isa.add(isa.load(position), way), position);
-        }
-    }
+    splat(isa, [isa.sum(sum[0]) * share, isa.sum(sum[1]) * share, isa.sum(sum[2]) * share])
 }

@@ -165,7 +165,6 @@ impl Mesh {
     pub(crate) fn kernel_parts(&mut self) -> KernelParts<'_> {
         KernelParts {
             topology: &self.topology,
-            present: self.topology.present(),
             positions: &mut self.positions,
             velocities: &mut self.velocities,
             masses: &self.masses,
@@ -177,8 +176,6 @@ impl Mesh {
 /// A mesh, taken apart for a kernel.
 pub(crate) struct KernelParts<'a> {
     pub(crate) topology: &'a Topology,
-    /// 1 for each node, 0 for the padding.
-    pub(crate) present: &'a [Lanes],
     pub(crate) positions: &'a mut Vectors,
     pub(crate) velocities: &'a mut Vectors,
     pub(crate) masses: &'a [Lanes],

@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{Isa, Kernel, Quad};
+use super::{Isa, Kernel, Lanes3, Quad, quads};
 use crate::geometry::{LANES, Lanes};
 
 /// Lanes of one register.
@@ -114,16 +114,8 @@ impl Isa for Avx2 {
     }
 
     #[inline(always)]
-    fn table<'a>(self, components: [&'a [Lanes]; 3], room: &'a mut Vec<Quad>) -> &'a [Quad] {
-        let [x, y, z] = components.map(<[Lanes]>::as_flattened);
-        if room.len() < x.len() {
-            room.resize(x.len(), [0.0; 4]);
-        }
-        let quads = &mut room[..x.len()];
-        for (quad, ((&x, &y), &z)) in quads.iter_mut().zip(x.iter().zip(y).zip(z)) {
-            *quad = [x, y, z, 0.0];
-        }
-        quads
+    fn table<'a>(self, chunks: &[Lanes3], room: &'a mut Vec<Quad>) -> &'a [Quad] {
+        quads(chunks, room)
     }
 
     #[inline(always)]

@@ -4,7 +4,7 @@
 use std::arch::x86_64::*;
 
 use super::avx2::Avx2;
-use super::{Isa, Kernel, Quad};
+use super::{Isa, Kernel, Lanes3, Quad};
 use crate::geometry::{LANES, Lanes};
 
 /// The proof that the machine has AVX-512F. There is none without.
@@ -88,12 +88,12 @@ impl Isa for Avx512 {
     }
 
     #[inline(always)]
-    fn table<'a>(self, components: [&'a [Lanes]; 3], _: &'a mut Vec<Quad>) -> Self::Table<'a> {
+    fn table<'a>(self, chunks: &[Lanes3], _: &'a mut Vec<Quad>) -> Self::Table<'a> {
         let mut table = [[self.splat(0.0); Self::MOST_CHUNKS]; 3];
-        for axis in 0..3 {
-            for chunk in 0..Self::MOST_CHUNKS {
-                if let Some(lanes) = components[axis].get(chunk) {
-                    table[axis][chunk] = self.load(lanes);
+        for chunk in 0..Self::MOST_CHUNKS {
+            if let Some(Lanes3(components)) = chunks.get(chunk) {
+                for axis in 0..3 {
+                    table[axis][chunk] = self.load(&components[axis]);
                 }
             }
         }

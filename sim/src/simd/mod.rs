@@ -160,9 +160,8 @@ pub(crate) trait Isa: Copy {
     fn div(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
     fn sqrt(self, a: Self::Vector) -> Self::Vector;
 
-    /// Makes a table of the components x, y and z, all of one length. `room` is memory that the table
-    /// may use, of any content.
-    fn table<'a>(self, components: [&'a [Lanes]; 3], room: &'a mut Vec<Quad>) -> Self::Table<'a>;
+    /// Makes a table of vectors. `room` is memory that the table may use, of any content.
+    fn table<'a>(self, chunks: &[Lanes3], room: &'a mut Vec<Quad>) -> Self::Table<'a>;
 
     /// The vectors of these nodes, each of which must be in the table.
     fn look_up(self, table: Self::Table<'_>, nodes: &[u32; LANES]) -> [Self::Vector; 3];
@@ -175,6 +174,12 @@ pub(crate) trait Isa: Copy {
         fold(lanes)
     }
 }
+
+/// The components x, y and z of [`LANES`] consecutive nodes, where loads and stores are fastest: a load
+/// across two cache lines from a store before it can stall.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+pub(crate) struct Lanes3(pub(crate) [Lanes; 3]);
 
 /// The components x, y, z of one node and a number of no meaning.
 pub(crate) type Quad = [f32; 4];
@@ -190,4 +195,20 @@ pub(crate) fn fold(mut lanes: Lanes) -> f32 {
         half /= 2;
     }
     lanes[0]
+}
+
+/// Writes vectors node by node.
+#[inline(always)]
+fn quads<'a>(chunks: &[Lanes3], room: &'a mut Vec<Quad>) -> &'a [Quad] {
+    let len = chunks.len() * LANES;
+    if room.len() < len {
+        room.resize(len, [0.0; 4]);
+    }
+    let quads = &mut room[..len];
+    for (quads, Lanes3([x, y, z])) in quads.chunks_exact_mut(LANES).zip(chunks) {
+        for (lane, quad) in quads.iter_mut().enumerate() {
+            *quad = [x[lane], y[lane], z[lane], 0.0];
+        }
+    }
+    quads
 }

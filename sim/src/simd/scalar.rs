@@ -1,6 +1,6 @@
 //! Lanes as plain arrays, which the compiler makes into whatever the target's baseline has.
 
-use super::{Isa, Quad};
+use super::{Isa, Lanes3, Quad, quads};
 use crate::geometry::{LANES, Lanes};
 
 #[derive(Clone, Copy)]
@@ -17,7 +17,7 @@ fn each(a: Lanes, b: Lanes, operation: impl Fn(f32, f32) -> f32) -> Lanes {
 
 impl Isa for Scalar {
     type Vector = Lanes;
-    type Table<'a> = [&'a [Lanes]; 3];
+    type Table<'a> = &'a [Quad];
 
     #[inline(always)]
     fn splat(self, value: f32) -> Lanes {
@@ -60,21 +60,18 @@ impl Isa for Scalar {
     }
 
     #[inline(always)]
-    fn table<'a>(self, components: [&'a [Lanes]; 3], _: &'a mut Vec<Quad>) -> [&'a [Lanes]; 3] {
-        components
+    fn table<'a>(self, chunks: &[Lanes3], room: &'a mut Vec<Quad>) -> &'a [Quad] {
+        quads(chunks, room)
     }
 
     #[inline(always)]
-    fn look_up(self, table: [&[Lanes]; 3], nodes: &[u32; LANES]) -> [Lanes; 3] {
-        // One length for all three, so that one comparison a node is enough.
-        let len = table[0].len();
-        let [x, y, z] = table.map(|component| component[..len].as_flattened());
+    fn look_up(self, table: &[Quad], nodes: &[u32; LANES]) -> [Lanes; 3] {
         let mut found = [[0.0; LANES]; 3];
         for (lane, &node) in nodes.iter().enumerate() {
-            let node = node as usize;
-            found[0][lane] = x[node];
-            found[1][lane] = y[node];
-            found[2][lane] = z[node];
+            let [x, y, z, _] = table[node as usize];
+            found[0][lane] = x;
+            found[1][lane] = y;
+            found[2][lane] = z;
         }
         found
     }
