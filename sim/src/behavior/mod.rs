@@ -3,6 +3,7 @@
 mod fixed;
 mod mass_spring;
 mod scripted;
+#[allow(unsafe_code)]
 mod spring_kernel;
 
 use std::any::Any;

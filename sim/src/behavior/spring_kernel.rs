@@ -66,7 +66,7 @@ impl Kernel for Advance<'_> {
     }
 }
 
-/// Puts the components of each chunk side by side.
+/// Puts the components of each chunk side by side. There are `len` chunks then, or a panic.
 #[inline(always)]
 fn gather(chunks: &mut Vec<Lanes3>, components: &[Vec<Lanes>; 3], len: usize) {
     let [x, y, z] = components.each_ref().map(|component| &component[..len]);
@@ -90,8 +90,13 @@ trait Law<I: Isa>: Copy {
     const NEEDS_VELOCITY: bool;
 
     /// The pull over the way (m) to the second end, which moves with the relative velocity (m/s).
-    fn pull(self, isa: I, way: [I::Vector; 3], relative: [I::Vector; 3], rest: I::Vector)
-    -> I::Vector;
+    fn pull(
+        self,
+        isa: I,
+        way: [I::Vector; 3],
+        relative: [I::Vector; 3],
+        rest: I::Vector,
+    ) -> I::Vector;
 }
 
 /// Hooke's law: k (1 − r/l).
@@ -212,7 +217,10 @@ impl Step {
             let mut position = load(isa, &positions[chunk]);
             let mut velocity = load(isa, &velocities[chunk]);
             let slots = parts.topology.slots(chunk);
-            let own = edge_forces(isa, slots, [near, near_velocity], position, velocity, edges);
+            let tables = [near, near_velocity];
+            // SAFETY: a topology's slots name its own nodes only, and the tables hold all chunks of
+            // them (see `gather`).
+            let own = unsafe { edge_forces(isa, slots, tables, position, velocity, edges) };
             let to_center = load(isa, &pulled[chunk]);
             let (mass, inverse_mass) = (isa.load(&masses[chunk]), isa.load(&inverse_masses[chunk]));
             for axis in 0..3 {
@@ -233,8 +241,11 @@ impl Step {
 
 /// The forces of the springs between nodes on the nodes of one chunk. The tables are those of positions
 /// and, where the law asks for them, velocities.
+///
+/// # Safety
+/// Both tables hold every neighbour that the slots name.
 #[inline(always)]
-fn edge_forces<I: Isa, L: Law<I>>(
+unsafe fn edge_forces<I: Isa, L: Law<I>>(
     isa: I,
     slots: &[Slot],
     [near, near_velocity]: [I::Table<'_>; 2],
@@ -244,9 +255,12 @@ fn edge_forces<I: Isa, L: Law<I>>(
 ) -> [I::Vector; 3] {
     let mut force = [isa.splat(0.0); 3];
     for slot in slots {
-        let way = minus(isa, isa.look_up(near, &slot.neighbour), position);
+        // SAFETY: the caller promises it.
+        let other = unsafe { isa.look_up(near, &slot.neighbour) };
+        let way = minus(isa, other, position);
         let relative = if L::NEEDS_VELOCITY {
-            minus(isa, isa.look_up(near_velocity, &slot.neighbour), velocity)
+            // SAFETY: likewise.
+            minus(isa, unsafe { isa.look_up(near_velocity, &slot.neighbour) }, velocity)
         } else {
             way
         };

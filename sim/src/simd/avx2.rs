@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{Isa, Kernel, Lanes3, Quad, quads};
+use super::{Isa, Kernel, Lanes3, Quad};
 use crate::geometry::{LANES, Lanes};
 
 /// Lanes of one register.
@@ -22,21 +22,64 @@ impl Avx2 {
         unsafe { with_avx2(self, kernel) }
     }
 
-    /// The vectors of eight nodes, each of which is in the table.
+    /// The sum over eight lanes, in halves.
+    #[inline(always)]
+    pub(super) fn sum_of_half(self, half: __m256) -> f32 {
+        // SAFETY: the machine has AVX2, or there were no `self`.
+        unsafe {
+            let four = _mm_add_ps(_mm256_castps256_ps128(half), _mm256_extractf128_ps::<1>(half));
+            let two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+            _mm_cvtss_f32(_mm_add_ss(two, _mm_movehdup_ps(two)))
+        }
+    }
+
+    /// Writes the vectors of eight nodes one after the other.
+    #[inline(always)]
+    fn write_quads(self, [x, y, z]: [__m256; 3], quads: &mut [Quad]) {
+        // SAFETY: the machine has AVX2, or there were no `self`.
+        let pairs = unsafe {
+            let zero = _mm256_setzero_ps();
+            let (xz_low, xz_high) = (_mm256_unpacklo_ps(x, z), _mm256_unpackhi_ps(x, z));
+            let (y_low, y_high) = (_mm256_unpacklo_ps(y, zero), _mm256_unpackhi_ps(y, zero));
+            [
+                _mm256_unpacklo_ps(xz_low, y_low),
+                _mm256_unpackhi_ps(xz_low, y_low),
+                _mm256_unpacklo_ps(xz_high, y_high),
+                _mm256_unpackhi_ps(xz_high, y_high),
+            ]
+        };
+        let (low, high) = quads.split_at_mut(HALF / 2);
+        for lane in 0..HALF / 2 {
+            // SAFETY: as before; each pointer is that of four numbers.
+            unsafe {
+                let (first, second) =
+                    (_mm256_castps256_ps128(pairs[lane]), _mm256_extractf128_ps::<1>(pairs[lane]));
+                _mm_storeu_ps(low[lane].as_mut_ptr(), first);
+                _mm_storeu_ps(high[lane].as_mut_ptr(), second);
+            }
+        }
+    }
+
+    /// The vectors of eight nodes.
     ///
     /// # Safety
     /// Each of them is in the table.
     #[inline(always)]
-    unsafe fn transpose(self, table: &[Quad], nodes: &[u32]) -> [__m256; 3] {
-        // SAFETY: the machine has AVX2, or there were no `self`; the nodes are in the table.
+    unsafe fn read_quads(self, table: &[Quad], nodes: &[u32]) -> [__m256; 3] {
+        let mut pairs = [self.splat(0.0)[0]; HALF / 2];
+        for (lane, pair) in pairs.iter_mut().enumerate() {
+            let (first, second) = (nodes[lane] as usize, nodes[lane + HALF / 2] as usize);
+            // SAFETY: the machine has AVX2, or there were no `self`; the caller promises that the
+            // nodes are in the table, whose entries are four numbers.
+            *pair = unsafe {
+                let first = _mm_loadu_ps(table.get_unchecked(first).as_ptr());
+                let second = _mm_loadu_ps(table.get_unchecked(second).as_ptr());
+                _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(first), second)
+            };
+        }
+        let [a, b, c, d] = pairs;
+        // SAFETY: as before.
         unsafe {
-            let quad = |lane: usize| {
-                _mm_loadu_ps(table.as_ptr().add(*nodes.get_unchecked(lane) as usize).cast())
-            };
-            let pair = |lane: usize| {
-                _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(quad(lane)), quad(lane + 4))
-            };
-            let (a, b, c, d) = (pair(0), pair(1), pair(2), pair(3));
             let (xy_ab, xy_cd) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
             let (z_ab, z_cd) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
             [
@@ -114,26 +157,32 @@ impl Isa for Avx2 {
     }
 
     #[inline(always)]
-    fn table<'a>(self, chunks: &[Lanes3], room: &'a mut Vec<Quad>) -> &'a [Quad] {
-        quads(chunks, room)
+    fn sum(self, vector: Pair) -> f32 {
+        // SAFETY: as in `splat`.
+        self.sum_of_half(unsafe { _mm256_add_ps(vector[0], vector[1]) })
     }
 
     #[inline(always)]
-    fn look_up(self, table: &[Quad], nodes: &[u32; LANES]) -> [Pair; 3] {
-        // SAFETY: as in `splat`; the pointers are those of eight numbers each.
-        let greatest = unsafe {
-            let low = _mm256_loadu_si256(nodes.as_ptr().cast());
-            let high = _mm256_loadu_si256(nodes[HALF..].as_ptr().cast());
-            let last = _mm256_set1_epi32(table.len() as i32 - 1);
-            let greatest = _mm256_max_epu32(low, high);
-            _mm256_movemask_epi8(_mm256_cmpeq_epi32(_mm256_max_epu32(greatest, last), last))
-        };
-        // One comparison for all sixteen.
-        assert!(greatest == -1 && !table.is_empty(), "a node past the last");
-        // SAFETY: they are in the table.
-        let (low, high) = unsafe {
-            (self.transpose(table, &nodes[..HALF]), self.transpose(table, &nodes[HALF..]))
-        };
+    fn table<'a>(self, chunks: &[Lanes3], room: &'a mut Vec<Quad>) -> &'a [Quad] {
+        let len = chunks.len() * LANES;
+        if room.len() < len {
+            room.resize(len, [0.0; 4]);
+        }
+        let quads = &mut room[..len];
+        for (quads, Lanes3([x, y, z])) in quads.chunks_exact_mut(LANES).zip(chunks) {
+            let (x, y, z) = (self.load(x), self.load(y), self.load(z));
+            for (half, quads) in quads.chunks_exact_mut(HALF).enumerate() {
+                self.write_quads([x[half], y[half], z[half]], quads);
+            }
+        }
+        quads
+    }
+
+    #[inline(always)]
+    unsafe fn look_up(self, table: &[Quad], nodes: &[u32; LANES]) -> [Pair; 3] {
+        let (low, high) = nodes.split_at(HALF);
+        // SAFETY: the caller promises that they are in the table.
+        let (low, high) = unsafe { (self.read_quads(table, low), self.read_quads(table, high)) };
         [[low[0], high[0]], [low[1], high[1]], [low[2], high[2]]]
     }
 }

@@ -88,6 +88,16 @@ impl Isa for Avx512 {
     }
 
     #[inline(always)]
+    fn sum(self, vector: __m512) -> f32 {
+        // SAFETY: as in `splat`.
+        let half = unsafe {
+            let upper = _mm512_extractf64x4_pd::<1>(_mm512_castps_pd(vector));
+            _mm256_add_ps(_mm512_castps512_ps256(vector), _mm256_castpd_ps(upper))
+        };
+        self.0.sum_of_half(half)
+    }
+
+    #[inline(always)]
     fn table<'a>(self, chunks: &[Lanes3], _: &'a mut Vec<Quad>) -> Self::Table<'a> {
         let mut table = [[self.splat(0.0); Self::MOST_CHUNKS]; 3];
         for chunk in 0..Self::MOST_CHUNKS {
@@ -101,7 +111,7 @@ impl Isa for Avx512 {
     }
 
     #[inline(always)]
-    fn look_up(self, table: Self::Table<'_>, nodes: &[u32; LANES]) -> [__m512; 3] {
+    unsafe fn look_up(self, table: Self::Table<'_>, nodes: &[u32; LANES]) -> [__m512; 3] {
         // SAFETY: as in `splat`; the pointer is that of sixteen numbers.
         let (nodes, in_third) = unsafe {
             let nodes = _mm512_loadu_si512(nodes.as_ptr().cast());

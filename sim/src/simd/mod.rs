@@ -163,16 +163,14 @@ pub(crate) trait Isa: Copy {
     /// Makes a table of vectors. `room` is memory that the table may use, of any content.
     fn table<'a>(self, chunks: &[Lanes3], room: &'a mut Vec<Quad>) -> Self::Table<'a>;
 
-    /// The vectors of these nodes, each of which must be in the table.
-    fn look_up(self, table: Self::Table<'_>, nodes: &[u32; LANES]) -> [Self::Vector; 3];
+    /// The vectors of these nodes.
+    ///
+    /// # Safety
+    /// Each of them is in the table.
+    unsafe fn look_up(self, table: Self::Table<'_>, nodes: &[u32; LANES]) -> [Self::Vector; 3];
 
     /// The sum over the lanes, as [`fold`] takes it.
-    #[inline(always)]
-    fn sum(self, vector: Self::Vector) -> f32 {
-        let mut lanes = [0.0; LANES];
-        self.store(vector, &mut lanes);
-        fold(lanes)
-    }
+    fn sum(self, vector: Self::Vector) -> f32;
 }
 
 /// The components x, y and z of [`LANES`] consecutive nodes, where loads and stores are fastest: a load
@@ -195,20 +193,4 @@ pub(crate) fn fold(mut lanes: Lanes) -> f32 {
         half /= 2;
     }
     lanes[0]
-}
-
-/// Writes vectors node by node.
-#[inline(always)]
-fn quads<'a>(chunks: &[Lanes3], room: &'a mut Vec<Quad>) -> &'a [Quad] {
-    let len = chunks.len() * LANES;
-    if room.len() < len {
-        room.resize(len, [0.0; 4]);
-    }
-    let quads = &mut room[..len];
-    for (quads, Lanes3([x, y, z])) in quads.chunks_exact_mut(LANES).zip(chunks) {
-        for (lane, quad) in quads.iter_mut().enumerate() {
-            *quad = [x[lane], y[lane], z[lane], 0.0];
-        }
-    }
-    quads
 }

@@ -1,6 +1,6 @@
 //! Lanes as plain arrays, which the compiler makes into whatever the target's baseline has.
 
-use super::{Isa, Lanes3, Quad, quads};
+use super::{Isa, Lanes3, Quad, fold};
 use crate::geometry::{LANES, Lanes};
 
 #[derive(Clone, Copy)]
@@ -60,12 +60,21 @@ impl Isa for Scalar {
     }
 
     #[inline(always)]
-    fn table<'a>(self, chunks: &[Lanes3], room: &'a mut Vec<Quad>) -> &'a [Quad] {
-        quads(chunks, room)
+    fn sum(self, vector: Lanes) -> f32 {
+        fold(vector)
     }
 
     #[inline(always)]
-    fn look_up(self, table: &[Quad], nodes: &[u32; LANES]) -> [Lanes; 3] {
+    fn table<'a>(self, chunks: &[Lanes3], room: &'a mut Vec<Quad>) -> &'a [Quad] {
+        room.clear();
+        for Lanes3([x, y, z]) in chunks {
+            room.extend(x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z, 0.0]));
+        }
+        room
+    }
+
+    #[inline(always)]
+    unsafe fn look_up(self, table: &[Quad], nodes: &[u32; LANES]) -> [Lanes; 3] {
         let mut found = [[0.0; LANES]; 3];
         for (lane, &node) in nodes.iter().enumerate() {
             let [x, y, z, _] = table[node as usize];
