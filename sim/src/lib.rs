@@ -18,8 +18,9 @@
 //! | §6.2: messages | [`message`] |
 //! | §7.1.1: particles | [`scene`] |
 //! | §7.2: the pipeline and what it is compared with | [`executor`] |
+//! | — | kernels in vector instructions | [`simd`] |
 
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 pub mod behavior;
 pub mod block;
@@ -33,5 +34,7 @@ pub mod object;
 pub mod pool;
 pub mod render;
 pub mod scene;
+#[allow(unsafe_code)]
+pub mod simd;
 pub mod stages;
 pub mod state;

@@ -15,6 +15,7 @@ use crate::interaction::{Contact, ContactSink, Rules, Scratch, TableFull};
 use crate::message::Message;
 use crate::object::{Drawing, Fault, FaultKind, Object, ObjectId};
 use crate::render::Renderer;
+use crate::simd::Simd;
 
 /// What the interaction stage counted. Independent of blocking and executor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -43,6 +44,8 @@ pub struct Stages {
     /// How long one object's update may take before the object is quarantined, if there is a limit.
     /// It is a limit on time as measured, so what it does is not repeatable.
     pub callback_budget: Option<Duration>,
+    /// The vector instructions by which kernels run; usually the widest. Results are the same.
+    pub simd: Simd,
 }
 
 impl Stages {
@@ -173,6 +176,7 @@ impl Stages {
             frame,
             time_step: self.time_step,
             gravity: self.gravity,
+            simd: self.simd,
             object: object.id(),
             segments: given.segments,
             records: given.records,

@@ -58,6 +58,7 @@ fn report_has_every_key() {
         "scene",
         "executor",
         "threads",
+        "simd",
         "objects",
         "nodes",
         "springs",
@@ -113,6 +114,23 @@ fn every_executor_says_the_same() {
 }
 
 #[test]
+fn vector_instructions_change_no_result() {
+    let mut hashes = Vec::new();
+    for name in ["scalar", "avx2", "avx512"] {
+        let args = ["--objects", "30", "--frames", "40", "--gravity", "--simd", name];
+        match dualframe_sim::simd::Instructions::ALL.into_iter().find(|all| all.name() == name) {
+            Some(there) if dualframe_sim::simd::Simd::new(there).is_ok() => {
+                let report = report(&args);
+                assert_eq!(report["simd"], name);
+                hashes.push(report["state_hash"].clone());
+            }
+            _ => refused(&args, name),
+        }
+    }
+    assert!(hashes.iter().all(|hash| *hash == hashes[0]), "{hashes:?}");
+}
+
+#[test]
 fn bad_arguments() {
     refused(&["--objects", "0"], "--objects");
     refused(&["--objects", "banana"], "banana");
@@ -125,6 +143,7 @@ fn bad_arguments() {
     refused(&["--frames", "0"], "--frames");
     refused(&["--frames-in-flight", "3"], "--frames-in-flight");
     refused(&["--executor", "magic"], "magic");
+    refused(&["--simd", "magic"], "magic");
     refused(&["--nonsense"], "--nonsense");
     refused(&["nonsense"], "nonsense");
     refused(&["--window", "--headless"], "--window");

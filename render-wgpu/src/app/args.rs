@@ -8,6 +8,7 @@ use dualframe_sim::blocking::{Blocking, Grain};
 use dualframe_sim::executor::{Entry, ExecutorKind, MAX_THREADS};
 use dualframe_sim::pool::cores;
 use dualframe_sim::scene::ParticleScene;
+use dualframe_sim::simd::{Instructions, Simd};
 
 /// The most frames of one run: each takes 24 bytes of the report.
 const MAX_FRAMES: u64 = 10_000_000;
@@ -62,6 +63,10 @@ pub(super) struct Particles {
     #[arg(long, value_name = "N", default_value_t = 2,
           value_parser = clap::value_parser!(u8).range(1..=2))]
     pub(super) frames_in_flight: u8,
+    #[arg(long, value_name = "NAME", value_parser = parse_simd,
+          help = format!("Vector instructions of the kernels, {}; the widest that the machine has \
+                          if not given", Instructions::ALL.map(Instructions::name).join(" or ")))]
+    simd: Option<Simd>,
     /// Show a window (not there yet).
     #[arg(long, conflicts_with_all = ["headless", "offscreen"])]
     window: bool,
@@ -118,6 +123,10 @@ impl Particles {
         if self.frames_in_flight == 1 { Entry::AfterSwap } else { Entry::AfterUpdate }
     }
 
+    pub(super) fn simd(&self) -> Simd {
+        self.simd.unwrap_or_else(Simd::detect)
+    }
+
     /// What fits no single argument.
     fn check(self) -> Result<Self, String> {
         let missing = [
@@ -149,6 +158,14 @@ fn parse_threads(text: &str) -> Result<usize, String> {
 fn parse_number(text: &str, most: usize) -> Result<usize, String> {
     let number = text.parse().ok().filter(|number| (1..=most).contains(number));
     number.ok_or_else(|| format!("not a whole number from 1 to {most}"))
+}
+
+fn parse_simd(text: &str) -> Result<Simd, String> {
+    let named = Instructions::ALL.into_iter().find(|instructions| instructions.name() == text);
+    let instructions = named.ok_or_else(|| {
+        format!("not one of {}", Instructions::ALL.map(Instructions::name).join(", "))
+    })?;
+    Simd::new(instructions).map_err(|lacking| lacking.to_string())
 }
 
 /// What the arguments ask for.

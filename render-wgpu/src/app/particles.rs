@@ -4,7 +4,7 @@ use dualframe_sim::executor::{ExecutorError, ExecutorKind};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::object::FaultKind;
 use dualframe_sim::render::NullRenderer;
-use dualframe_sim::scene::{ParticleScene, SceneError};
+use dualframe_sim::scene::{ParticleScene, Scene, SceneError};
 use indicatif::{ProgressBar, ProgressStyle};
 use thiserror::Error;
 
@@ -33,6 +33,11 @@ pub(super) fn run(args: &Particles, count: AllocationCounter<'_>) -> Result<Repo
         gravity: args.gravity,
         damping: true,
     };
+    let build = || {
+        let mut scene = scene.build()?;
+        scene.stages.simd = args.simd();
+        Ok::<_, SceneError>(scene)
+    };
     let settings = Settings {
         executor: args.executor.into(),
         threads: args.threads,
@@ -40,7 +45,7 @@ pub(super) fn run(args: &Particles, count: AllocationCounter<'_>) -> Result<Repo
         grain: args.grain(),
         entry: args.entry(),
     };
-    let mut manager = VeManager::new(scene.build()?, settings)?;
+    let mut manager = VeManager::new(build()?, settings)?;
     let mut measure = Measure::new(args.frames, count);
     let bar = progress_bar(args.frames);
     measure.start();
@@ -54,7 +59,7 @@ pub(super) fn run(args: &Particles, count: AllocationCounter<'_>) -> Result<Repo
     let speed_up = match settings.executor {
         ExecutorKind::Serial => 1.0,
         _ => {
-            serial_seconds(&scene, settings, args.frames)?
+            serial_seconds(build()?, settings, args.frames)?
                 / measure.seconds_of_first(REFERENCE_FRAMES)
         }
     };
@@ -72,9 +77,9 @@ fn progress_bar(frames: u64) -> ProgressBar {
 }
 
 /// Seconds that the serial executor takes for the first frames of the same environment.
-fn serial_seconds(scene: &ParticleScene, settings: Settings, frames: u64) -> Result<f64, RunError> {
+fn serial_seconds(scene: Scene, settings: Settings, frames: u64) -> Result<f64, RunError> {
     let settings = Settings { executor: ExecutorKind::Serial, threads: 1, ..settings };
-    let mut manager = VeManager::new(scene.build()?, settings)?;
+    let mut manager = VeManager::new(scene, settings)?;
     let frames = frames.min(REFERENCE_FRAMES);
     let mut measure = Measure::new(frames, &|| 0);
     measure.start();
@@ -98,6 +103,7 @@ fn report(args: &Particles, manager: &VeManager, measure: &Measure<'_>, speed_up
         scene: "particles",
         executor: ExecutorKind::from(args.executor).name(),
         threads: args.threads,
+        simd: args.simd().instructions().name(),
         objects: args.objects,
         nodes,
         springs,

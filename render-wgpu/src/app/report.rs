@@ -14,6 +14,7 @@ pub(super) struct Report {
     pub(super) scene: &'static str,
     pub(super) executor: &'static str,
     pub(super) threads: usize,
+    pub(super) simd: &'static str,
     pub(super) objects: usize,
     pub(super) nodes: usize,
     pub(super) springs: usize,
@@ -125,13 +126,13 @@ impl Report {
     }
 
     fn table(&self, out: &mut impl Write) -> std::io::Result<()> {
-        let Self { executor, threads, objects, frames, seconds, fps, frame_ms, .. } = self;
+        let Self { executor, threads, simd, objects, frames, seconds, fps, frame_ms, .. } = self;
         writeln!(
             out,
             "particles: {objects} objects, {} nodes, {} springs; {frames} frames, seed {}",
             self.nodes, self.springs, self.seed
         )?;
-        writeln!(out, "{executor} on {threads} threads: {fps:.1} fps, {seconds:.3} s")?;
+        writeln!(out, "{executor} on {threads} threads ({simd}): {fps:.1} fps, {seconds:.3} s")?;
         let speed_up = self.speed_up;
         writeln!(out, "speed-up over the serial run: {speed_up:.2} (first frames of both)")?;
         let FrameMilliseconds { p50, p99, p999, max } = frame_ms;

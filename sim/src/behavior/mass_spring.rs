@@ -5,7 +5,7 @@ use std::hash::Hasher;
 use glam::Vec3;
 use thiserror::Error;
 
-use super::spring_kernel::{Dashpot, Elastic, Forces, drift};
+use super::spring_kernel::Advance;
 use super::{Behavior, Input};
 use crate::geometry::{Geometry, Mesh, Spring};
 use crate::interaction::Contact;
@@ -118,22 +118,18 @@ impl Behavior for MassSpring {
                 node => mesh.apply_impulse(node, impulse),
             }
         }
-        let mut parts = mesh.kernel_parts();
-        let mut forces = Forces::new(input.workspace.forces(parts.masses.len()));
-        if self.damping > 0.0 {
-            let law = Dashpot { damping: self.damping };
-            forces.compute(&parts, law, law);
-            forces.kick(&mut parts, [0.0; 3], input.time_step);
-        }
-        let gravity = if self.weightless { [0.0; 3] } else { input.gravity.to_array() };
-        let step = input.time_step / self.substeps as f32;
-        let edges = Elastic { stiffness: self.stiffness };
-        let to_center = Elastic { stiffness: self.center_stiffness };
-        for _ in 0..self.substeps {
-            forces.compute(&parts, edges, to_center);
-            forces.kick(&mut parts, gravity, step);
-            drift(&mut parts, step);
-        }
+        let parts = mesh.kernel_parts();
+        let chunks = parts.topology.present().len();
+        input.simd.for_look_up(chunks).run(Advance {
+            parts,
+            workspace: input.workspace,
+            damping: self.damping,
+            stiffness: self.stiffness,
+            center_stiffness: self.center_stiffness,
+            gravity: if self.weightless { [0.0; 3] } else { input.gravity.to_array() },
+            time: input.time_step,
+            substeps: self.substeps,
+        });
     }
 
     fn process(&mut self, message: &Message) {

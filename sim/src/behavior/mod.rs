@@ -3,6 +3,7 @@
 mod fixed;
 mod mass_spring;
 mod scripted;
+#[allow(unsafe_code)]
 mod spring_kernel;
 
 use std::any::Any;
@@ -10,10 +11,11 @@ use std::hash::Hasher;
 
 use glam::Vec3;
 
-use crate::geometry::{Geometry, LANES, Lanes};
+use crate::geometry::Geometry;
 use crate::interaction::Contact;
 use crate::message::Message;
 use crate::object::ObjectId;
+use crate::simd::{Lanes3, Quad, Simd};
 
 pub use fixed::Fixed;
 pub use mass_spring::{MassSpring, MassSpringError};
@@ -44,6 +46,7 @@ pub struct Input<'a> {
     pub time_step: f32,
     /// The acceleration of gravity, in metres per second squared.
     pub gravity: Vec3,
+    pub(crate) simd: Simd,
     pub(crate) object: ObjectId,
     pub(crate) segments: &'a [Segment],
     pub(crate) records: &'a [Contact],
@@ -76,17 +79,12 @@ pub(crate) struct Segment {
 /// Memory that the updates of a block's objects use one after the other.
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
-    forces: [Vec<Lanes>; 3],
-}
-
-impl Workspace {
-    /// Room for the forces on so many chunks of nodes, in newtons, of any content.
-    pub(crate) fn forces(&mut self, chunks: usize) -> [&mut [Lanes]; 3] {
-        self.forces.each_mut().map(|component| {
-            if component.len() < chunks {
-                component.resize(chunks, [0.0; LANES]);
-            }
-            &mut component[..chunks]
-        })
-    }
+    /// Of one body, in metres.
+    positions: Vec<Lanes3>,
+    /// Of one body, in metres per second.
+    velocities: Vec<Lanes3>,
+    /// What the springs to the centre pull at each node, in newtons.
+    pulled: Vec<Lanes3>,
+    /// Where positions and velocities are looked up.
+    tables: [Vec<Quad>; 2],
 }

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::bounds::Bounds;
 use super::topology::Topology;
-use super::vectors::{LANES, Lanes, Vectors, lane_sum};
+use super::vectors::{Lanes, Vectors, in_lanes, lane_sum};
 
 /// Why a mesh cannot be built.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
@@ -180,12 +180,4 @@ pub(crate) struct KernelParts<'a> {
     pub(crate) velocities: &'a mut Vectors,
     pub(crate) masses: &'a [Lanes],
     pub(crate) inverse_masses: &'a [Lanes],
-}
-
-fn in_lanes(values: impl Iterator<Item = f32>, len: usize) -> Vec<Lanes> {
-    let mut lanes = vec![[0.0; LANES]; len.div_ceil(LANES)];
-    for (lane, value) in lanes.as_flattened_mut().iter_mut().zip(values) {
-        *lane = value;
-    }
-    lanes
 }

@@ -14,8 +14,8 @@ pub use icosphere::{ICOSPHERE_EDGES, ICOSPHERE_FACES, ICOSPHERE_NODES, icosphere
 pub(crate) use mesh::KernelParts;
 pub use mesh::{Mesh, MeshError};
 pub use rigid::Rigid;
+pub(crate) use topology::Slot;
 pub use topology::{Spring, Topology, TopologyError, edges};
-pub(crate) use vectors::lane_sum;
 pub use vectors::{LANES, Lanes, Vectors};
 
 /// An object's shape and place.

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use thiserror::Error;
 
-use super::vectors::{LANES, Lanes};
+use super::vectors::{LANES, Lanes, in_lanes};
 
 /// A spring between two nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,12 +40,14 @@ pub enum TopologyError {
 }
 
 /// For [`LANES`] consecutive nodes one neighbour each.
+///
+/// A node with fewer neighbours than its lane mates is its own neighbour in the slots left over: a
+/// spring without length pulls at nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(64))]
 pub(crate) struct Slot {
     pub(crate) neighbour: [u32; LANES],
     pub(crate) rest: Lanes,
-    /// 1 where there is a spring, 0 where a node has fewer neighbours than its lane mates.
-    pub(crate) weight: Lanes,
 }
 
 /// The triangles and springs of a deformable body.
@@ -62,6 +64,8 @@ pub struct Topology {
     first_slot: Vec<usize>,
     /// For bodies with springs to their centre: each node's distance to it at rest, in metres.
     center_rest: Option<Vec<Lanes>>,
+    /// 1 for each node, 0 for the padding.
+    present: Vec<Lanes>,
 }
 
 impl Topology {
@@ -97,7 +101,8 @@ impl Topology {
             edges.iter().map(|&nodes| Spring { nodes, rest: length(nodes) }).collect();
         let (slots, first_slot) = neighbour_table(nodes, &springs);
         let center_rest = to_center.then(|| distances_to_mean(positions));
-        Ok(Self { nodes, triangles, springs, slots, first_slot, center_rest })
+        let present = in_lanes(std::iter::repeat_n(1.0, nodes), nodes);
+        Ok(Self { nodes, triangles, springs, slots, first_slot, center_rest, present })
     }
 
     /// The number of nodes.
@@ -139,6 +144,11 @@ impl Topology {
     pub(crate) fn center_lanes(&self) -> Option<&[Lanes]> {
         self.center_rest.as_deref()
     }
+
+    /// 1 for each node, 0 for the padding.
+    pub(crate) fn present(&self) -> &[Lanes] {
+        &self.present
+    }
 }
 
 /// The edges of a surface, each once, the lower node first, in ascending order.
@@ -161,15 +171,12 @@ fn neighbour_table(nodes: usize, springs: &[Spring]) -> (Vec<Slot>, Vec<usize>) 
     for (chunk, lists) in neighbours.chunks(LANES).enumerate() {
         let depth = lists.iter().map(Vec::len).max().unwrap_or(0);
         for row in 0..depth {
-            // A lane without a neighbour looks at a node of its own chunk, with weight 0.
-            let own = (chunk * LANES) as u32;
-            let mut slot =
-                Slot { neighbour: [own; LANES], rest: [0.0; LANES], weight: [0.0; LANES] };
+            let own = std::array::from_fn(|lane| (chunk * LANES + lane) as u32);
+            let mut slot = Slot { neighbour: own, rest: [0.0; LANES] };
             for (lane, list) in lists.iter().enumerate() {
                 if let Some(&(neighbour, rest)) = list.get(row) {
                     slot.neighbour[lane] = neighbour;
                     slot.rest[lane] = rest;
-                    slot.weight[lane] = 1.0;
                 }
             }
             slots.push(slot);
@@ -181,9 +188,5 @@ fn neighbour_table(nodes: usize, springs: &[Spring]) -> (Vec<Slot>, Vec<usize>) 
 
 fn distances_to_mean(positions: &[Vec3]) -> Vec<Lanes> {
     let mean = positions.iter().copied().sum::<Vec3>() / positions.len().max(1) as f32;
-    let mut rest = vec![[0.0; LANES]; positions.len().div_ceil(LANES)];
-    for (rest, &position) in rest.as_flattened_mut().iter_mut().zip(positions) {
-        *rest = (position - mean).length();
-    }
-    rest
+    in_lanes(positions.iter().map(|&position| (position - mean).length()), positions.len())
 }

@@ -2,9 +2,11 @@
 
 use glam::Vec3;
 
+use crate::simd::fold;
+
 /// Nodes that the kernels handle at once. Sums over lanes are taken in a fixed order, so this number
 /// is part of what makes results equal on every machine: it never follows the machine's vector width.
-pub const LANES: usize = 4;
+pub const LANES: usize = 16;
 
 /// One component of [`LANES`] consecutive nodes.
 pub type Lanes = [f32; LANES];
@@ -140,6 +142,7 @@ fn range(lanes: &[Lanes], len: usize) -> (f32, f32) {
 }
 
 /// The sum of all numbers, lane by lane first. The padding is zero.
+#[inline(always)]
 pub(crate) fn lane_sum(lanes: &[Lanes]) -> f32 {
     let mut sum = [0.0; LANES];
     for chunk in lanes {
@@ -147,5 +150,14 @@ pub(crate) fn lane_sum(lanes: &[Lanes]) -> f32 {
             sum[lane] += chunk[lane];
         }
     }
-    sum.iter().sum()
+    fold(sum)
+}
+
+/// `len` numbers, padded with zeros.
+pub(crate) fn in_lanes(values: impl Iterator<Item = f32>, len: usize) -> Vec<Lanes> {
+    let mut lanes = vec![[0.0; LANES]; len.div_ceil(LANES)];
+    for (lane, value) in lanes.as_flattened_mut().iter_mut().zip(values) {
+        *lane = value;
+    }
+    lanes
 }

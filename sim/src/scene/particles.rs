@@ -16,6 +16,7 @@ use crate::interaction::{
     InteractionPair, NodeSpheres, NodesInShape, Penalty, PenaltyError, RuleError, Rules,
 };
 use crate::object::{Drawing, Group, Object, ObjectId, VisualProperties};
+use crate::simd::Simd;
 use crate::stages::Stages;
 
 /// The radius of a particle's nodes around its centre, in metres; usually 0.1.
@@ -139,8 +140,13 @@ impl ParticleScene {
             objects.push(wall);
         }
         let gravity = if self.gravity { Vec3::new(0.0, -GRAVITY, 0.0) } else { Vec3::ZERO };
-        let stages =
-            Stages { rules: self.rules()?, time_step: TIME_STEP, gravity, callback_budget: None };
+        let stages = Stages {
+            rules: self.rules()?,
+            time_step: TIME_STEP,
+            gravity,
+            callback_budget: None,
+            simd: Simd::detect(),
+        };
         Ok(Scene { objects, stages })
     }
 

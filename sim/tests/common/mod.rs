@@ -18,6 +18,7 @@ use dualframe_sim::object::{Group, Object, ObjectId};
 use dualframe_sim::pool::Pool;
 use dualframe_sim::render::NullRenderer;
 use dualframe_sim::scene::{ParticleScene, Scene};
+use dualframe_sim::simd::Simd;
 use dualframe_sim::stages::{PairCount, Stages};
 use dualframe_sim::state::StateHash;
 use glam::Vec3;
@@ -153,5 +154,6 @@ pub(crate) fn no_rules() -> Stages {
         time_step: 1.0 / 240.0,
         gravity: Vec3::ZERO,
         callback_budget: None,
+        simd: Simd::detect(),
     }
 }

@@ -1,0 +1,188 @@
+//! Sixteen lanes in two registers; nodes are looked up as quadruples in memory and transposed.
+
+use std::arch::x86_64::*;
+
+use super::{Isa, Kernel, Lanes3, Quad};
+use crate::geometry::{LANES, Lanes};
+
+/// Lanes of one register.
+const HALF: usize = LANES / 2;
+
+/// The proof that the machine has AVX2. There is none without.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Avx2(());
+
+impl Avx2 {
+    pub(super) fn detect() -> Option<Self> {
+        is_x86_feature_detected!("avx2").then_some(Self(()))
+    }
+
+    pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        // SAFETY: the machine has AVX2, or there were no `self`.
+        unsafe { with_avx2(self, kernel) }
+    }
+
+    /// The sum over eight lanes, in halves.
+    #[inline(always)]
+    pub(super) fn sum_of_half(self, half: __m256) -> f32 {
+        // SAFETY: the machine has AVX2, or there were no `self`.
+        unsafe {
+            let four = _mm_add_ps(_mm256_castps256_ps128(half), _mm256_extractf128_ps::<1>(half));
+            let two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+            _mm_cvtss_f32(_mm_add_ss(two, _mm_movehdup_ps(two)))
+        }
+    }
+
+    /// Writes the vectors of eight nodes one after the other.
+    #[inline(always)]
+    fn write_quads(self, [x, y, z]: [__m256; 3], quads: &mut [Quad]) {
+        // SAFETY: the machine has AVX2, or there were no `self`.
+        let pairs = unsafe {
+            let zero = _mm256_setzero_ps();
+            let (xz_low, xz_high) = (_mm256_unpacklo_ps(x, z), _mm256_unpackhi_ps(x, z));
+            let (y_low, y_high) = (_mm256_unpacklo_ps(y, zero), _mm256_unpackhi_ps(y, zero));
+            [
+                _mm256_unpacklo_ps(xz_low, y_low),
+                _mm256_unpackhi_ps(xz_low, y_low),
+                _mm256_unpacklo_ps(xz_high, y_high),
+                _mm256_unpackhi_ps(xz_high, y_high),
+            ]
+        };
+        let (low, high) = quads.split_at_mut(HALF / 2);
+        for lane in 0..HALF / 2 {
+            // SAFETY: as before; each pointer is that of four numbers.
+            unsafe {
+                let (first, second) =
+                    (_mm256_castps256_ps128(pairs[lane]), _mm256_extractf128_ps::<1>(pairs[lane]));
+                _mm_storeu_ps(low[lane].as_mut_ptr(), first);
+                _mm_storeu_ps(high[lane].as_mut_ptr(), second);
+            }
+        }
+    }
+
+    /// The vectors of eight nodes.
+    ///
+    /// # Safety
+    /// Each of them is in the table.
+    #[inline(always)]
+    unsafe fn read_quads(self, table: &[Quad], nodes: &[u32]) -> [__m256; 3] {
+        let mut pairs = [self.splat(0.0)[0]; HALF / 2];
+        for (lane, pair) in pairs.iter_mut().enumerate() {
+            let (first, second) = (nodes[lane] as usize, nodes[lane + HALF / 2] as usize);
+            // SAFETY: the machine has AVX2, or there were no `self`; the caller promises that the
+            // nodes are in the table, whose entries are four numbers.
+            *pair = unsafe {
+                let first = _mm_loadu_ps(table.get_unchecked(first).as_ptr());
+                let second = _mm_loadu_ps(table.get_unchecked(second).as_ptr());
+                _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(first), second)
+            };
+        }
+        let [a, b, c, d] = pairs;
+        // SAFETY: as before.
+        unsafe {
+            let (xy_ab, xy_cd) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
+            let (z_ab, z_cd) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
+            [
+                _mm256_shuffle_ps::<0b01_00_01_00>(xy_ab, xy_cd),
+                _mm256_shuffle_ps::<0b11_10_11_10>(xy_ab, xy_cd),
+                _mm256_shuffle_ps::<0b01_00_01_00>(z_ab, z_cd),
+            ]
+        }
+    }
+}
+
+#[target_feature(enable = "avx2")]
+fn with_avx2<K: Kernel>(avx2: Avx2, kernel: K) -> K::Output {
+    kernel.run(avx2)
+}
+
+/// Two registers.
+type Pair = [__m256; 2];
+
+impl Isa for Avx2 {
+    type Vector = Pair;
+    type Table<'a> = &'a [Quad];
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> Pair {
+        // SAFETY: the machine has AVX2, or there were no `self`.
+        unsafe { [_mm256_set1_ps(value); 2] }
+    }
+
+    #[inline(always)]
+    fn load(self, lanes: &Lanes) -> Pair {
+        let (low, high) = lanes.split_at(HALF);
+        // SAFETY: as in `splat`; each pointer is that of eight numbers.
+        unsafe { [_mm256_loadu_ps(low.as_ptr()), _mm256_loadu_ps(high.as_ptr())] }
+    }
+
+    #[inline(always)]
+    fn store(self, vector: Pair, lanes: &mut Lanes) {
+        let (low, high) = lanes.split_at_mut(HALF);
+        // SAFETY: as in `splat`; each pointer is that of eight numbers.
+        unsafe {
+            _mm256_storeu_ps(low.as_mut_ptr(), vector[0]);
+            _mm256_storeu_ps(high.as_mut_ptr(), vector[1]);
+        }
+    }
+
+    #[inline(always)]
+    fn add(self, a: Pair, b: Pair) -> Pair {
+        // SAFETY: as in `splat`.
+        unsafe { [_mm256_add_ps(a[0], b[0]), _mm256_add_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn sub(self, a: Pair, b: Pair) -> Pair {
+        // SAFETY: as in `splat`.
+        unsafe { [_mm256_sub_ps(a[0], b[0]), _mm256_sub_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn mul(self, a: Pair, b: Pair) -> Pair {
+        // SAFETY: as in `splat`.
+        unsafe { [_mm256_mul_ps(a[0], b[0]), _mm256_mul_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn div(self, a: Pair, b: Pair) -> Pair {
+        // SAFETY: as in `splat`.
+        unsafe { [_mm256_div_ps(a[0], b[0]), _mm256_div_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn sqrt(self, a: Pair) -> Pair {
+        // SAFETY: as in `splat`.
+        unsafe { [_mm256_sqrt_ps(a[0]), _mm256_sqrt_ps(a[1])] }
+    }
+
+    #[inline(always)]
+    fn sum(self, vector: Pair) -> f32 {
+        // SAFETY: as in `splat`.
+        self.sum_of_half(unsafe { _mm256_add_ps(vector[0], vector[1]) })
+    }
+
+    #[inline(always)]
+    fn table<'a>(self, chunks: &[Lanes3], room: &'a mut Vec<Quad>) -> &'a [Quad] {
+        let len = chunks.len() * LANES;
+        if room.len() < len {
+            room.resize(len, [0.0; 4]);
+        }
+        let quads = &mut room[..len];
+        for (quads, Lanes3([x, y, z])) in quads.chunks_exact_mut(LANES).zip(chunks) {
+            let (x, y, z) = (self.load(x), self.load(y), self.load(z));
+            for (half, quads) in quads.chunks_exact_mut(HALF).enumerate() {
+                self.write_quads([x[half], y[half], z[half]], quads);
+            }
+        }
+        quads
+    }
+
+    #[inline(always)]
+    unsafe fn look_up(self, table: &[Quad], nodes: &[u32; LANES]) -> [Pair; 3] {
+        let (low, high) = nodes.split_at(HALF);
+        // SAFETY: the caller promises that they are in the table.
+        let (low, high) = unsafe { (self.read_quads(table, low), self.read_quads(table, high)) };
+        [[low[0], high[0]], [low[1], high[1]], [low[2], high[2]]]
+    }
+}

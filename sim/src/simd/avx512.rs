@@ -1,0 +1,131 @@
+//! Sixteen lanes in one register, and all nodes of a small body in nine, where permutations look them
+//! up.
+
+use std::arch::x86_64::*;
+
+use super::avx2::Avx2;
+use super::{Isa, Kernel, Lanes3, Quad};
+use crate::geometry::{LANES, Lanes};
+
+/// The proof that the machine has AVX-512F. There is none without.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Avx512(Avx2);
+
+impl Avx512 {
+    /// The most chunks of nodes among which a kernel can look up.
+    pub(super) const MOST_CHUNKS: usize = 3;
+
+    pub(super) fn detect() -> Option<Self> {
+        let avx2 = Avx2::detect()?;
+        is_x86_feature_detected!("avx512f").then_some(Self(avx2))
+    }
+
+    pub(super) fn avx2(self) -> Avx2 {
+        self.0
+    }
+
+    pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        // SAFETY: the machine has AVX-512F, or there were no `self`.
+        unsafe { with_avx512(self, kernel) }
+    }
+}
+
+#[target_feature(enable = "avx512f")]
+fn with_avx512<K: Kernel>(avx512: Avx512, kernel: K) -> K::Output {
+    kernel.run(avx512)
+}
+
+impl Isa for Avx512 {
+    type Vector = __m512;
+    type Table<'a> = [[__m512; Avx512::MOST_CHUNKS]; 3];
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> __m512 {
+        // SAFETY: the machine has AVX-512F, or there were no `self`.
+        unsafe { _mm512_set1_ps(value) }
+    }
+
+    #[inline(always)]
+    fn load(self, lanes: &Lanes) -> __m512 {
+        // SAFETY: as in `splat`; the pointer is that of sixteen numbers.
+        unsafe { _mm512_loadu_ps(lanes.as_ptr()) }
+    }
+
+    #[inline(always)]
+    fn store(self, vector: __m512, lanes: &mut Lanes) {
+        // SAFETY: as in `splat`; the pointer is that of sixteen numbers.
+        unsafe { _mm512_storeu_ps(lanes.as_mut_ptr(), vector) }
+    }
+
+    #[inline(always)]
+    fn add(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_add_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn sub(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_sub_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn mul(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_mul_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn div(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_div_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn sqrt(self, a: __m512) -> __m512 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_sqrt_ps(a) }
+    }
+
+    #[inline(always)]
+    fn sum(self, vector: __m512) -> f32 {
+        // SAFETY: as in `splat`.
+        let half = unsafe {
+            let upper = _mm512_extractf64x4_pd::<1>(_mm512_castps_pd(vector));
+            _mm256_add_ps(_mm512_castps512_ps256(vector), _mm256_castpd_ps(upper))
+        };
+        self.0.sum_of_half(half)
+    }
+
+    #[inline(always)]
+    fn table<'a>(self, chunks: &[Lanes3], _: &'a mut Vec<Quad>) -> Self::Table<'a> {
+        let mut table = [[self.splat(0.0); Self::MOST_CHUNKS]; 3];
+        for chunk in 0..Self::MOST_CHUNKS {
+            if let Some(Lanes3(components)) = chunks.get(chunk) {
+                for axis in 0..3 {
+                    table[axis][chunk] = self.load(&components[axis]);
+                }
+            }
+        }
+        table
+    }
+
+    #[inline(always)]
+    unsafe fn look_up(self, table: Self::Table<'_>, nodes: &[u32; LANES]) -> [__m512; 3] {
+        // SAFETY: as in `splat`; the pointer is that of sixteen numbers.
+        let (nodes, in_third) = unsafe {
+            let nodes = _mm512_loadu_si512(nodes.as_ptr().cast());
+            (nodes, _mm512_test_epi32_mask(nodes, _mm512_set1_epi32(32)))
+        };
+        let mut found = [self.splat(0.0); 3];
+        for axis in 0..3 {
+            let [first, second, third] = table[axis];
+            // SAFETY: as in `splat`.
+            found[axis] = unsafe {
+                let found = _mm512_permutex2var_ps(first, nodes, second);
+                _mm512_mask_permutexvar_ps(found, in_third, nodes, third)
+            };
+        }
+        found
+    }
+}

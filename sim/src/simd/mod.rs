@@ -1,0 +1,196 @@
+//! The widest vector instructions that the machine has, chosen at run time, with the same bits from
+//! every width.
+//!
+//! A kernel is written once, over [`Isa`]: sixteen lanes and the operations on them. [`Simd::run`]
+//! compiles it for every set of instructions and picks one. Each operation is the IEEE 754 one, rounded
+//! once: there is no fused multiply-add, no approximate reciprocal, and sums over lanes have one order,
+//! [`fold`]'s. So a lane comes out the same whatever it was computed beside.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod scalar;
+
+use thiserror::Error;
+
+use self::scalar::Scalar;
+use crate::geometry::{LANES, Lanes};
+
+#[cfg(target_arch = "x86_64")]
+use self::{avx2::Avx2, avx512::Avx512};
+
+/// A set of vector instructions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Instructions {
+    /// What every machine of the target has: SSE2 on x86-64, NEON on AArch64.
+    Scalar,
+    /// AVX2, on x86-64.
+    Avx2,
+    /// AVX-512F, on x86-64.
+    Avx512,
+}
+
+impl Instructions {
+    /// All sets, the widest last.
+    pub const ALL: [Self; 3] = [Self::Scalar, Self::Avx2, Self::Avx512];
+
+    /// The name by which the program knows it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        }
+    }
+}
+
+/// The machine lacks a set of instructions.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[error("this machine has no {} instructions; the widest it has are {}", .asked.name(), .widest.name())]
+pub struct Lacking {
+    /// What was asked for.
+    pub asked: Instructions,
+    /// The widest set that the machine has.
+    pub widest: Instructions,
+}
+
+/// A set of instructions that this machine has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Simd(Kind);
+
+/// The sets, each with the proof that the machine has it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Scalar,
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
+}
+
+impl Simd {
+    /// These instructions.
+    ///
+    /// # Errors
+    /// The machine lacks them.
+    pub fn new(instructions: Instructions) -> Result<Self, Lacking> {
+        let kind = match instructions {
+            Instructions::Scalar => Some(Kind::Scalar),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2 => Avx2::detect().map(Kind::Avx2),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512 => Avx512::detect().map(Kind::Avx512),
+            #[cfg(not(target_arch = "x86_64"))]
+            _ => None,
+        };
+        let widest = || Self::detect().instructions();
+        kind.map(Self).ok_or_else(|| Lacking { asked: instructions, widest: widest() })
+    }
+
+    /// The widest that the machine has.
+    #[must_use]
+    pub fn detect() -> Self {
+        Self::available().last().unwrap_or(Self(Kind::Scalar))
+    }
+
+    /// All that the machine has, the widest last.
+    pub fn available() -> impl Iterator<Item = Self> {
+        Instructions::ALL.into_iter().filter_map(|instructions| Self::new(instructions).ok())
+    }
+
+    /// Which they are.
+    #[must_use]
+    pub fn instructions(self) -> Instructions {
+        match self.0 {
+            Kind::Scalar => Instructions::Scalar,
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx2(_) => Instructions::Avx2,
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512(_) => Instructions::Avx512,
+        }
+    }
+
+    /// Those to use for a kernel that looks up among so many chunks of nodes.
+    pub(crate) fn for_look_up(self, chunks: usize) -> Self {
+        match self.0 {
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512(avx512) if chunks > Avx512::MOST_CHUNKS => Self(Kind::Avx2(avx512.avx2())),
+            _ => self,
+        }
+    }
+
+    /// Runs a kernel by these instructions.
+    #[inline]
+    pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        match self.0 {
+            Kind::Scalar => kernel.run(Scalar),
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx2(avx2) => avx2.run(kernel),
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512(avx512) => avx512.run(kernel),
+        }
+    }
+}
+
+/// Something to be compiled for every set of instructions.
+pub(crate) trait Kernel {
+    /// What it comes to.
+    type Output;
+
+    /// The kernel itself. It and all that it calls must be `#[inline(always)]`, or they are compiled
+    /// for the baseline.
+    fn run<I: Isa>(self, isa: I) -> Self::Output;
+}
+
+/// The operations on [`LANES`] numbers at once.
+pub(crate) trait Isa: Copy {
+    /// [`LANES`] numbers.
+    type Vector: Copy;
+    /// Vectors of a body's nodes, ready to be looked up by the nodes' numbers.
+    type Table<'a>: Copy;
+
+    fn splat(self, value: f32) -> Self::Vector;
+    fn load(self, lanes: &Lanes) -> Self::Vector;
+    fn store(self, vector: Self::Vector, lanes: &mut Lanes);
+    fn add(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    fn sub(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    fn mul(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    fn div(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    fn sqrt(self, a: Self::Vector) -> Self::Vector;
+
+    /// Makes a table of vectors. `room` is memory that the table may use, of any content.
+    fn table<'a>(self, chunks: &[Lanes3], room: &'a mut Vec<Quad>) -> Self::Table<'a>;
+
+    /// The vectors of these nodes.
+    ///
+    /// # Safety
+    /// Each of them is in the table.
+    unsafe fn look_up(self, table: Self::Table<'_>, nodes: &[u32; LANES]) -> [Self::Vector; 3];
+
+    /// The sum over the lanes, as [`fold`] takes it.
+    fn sum(self, vector: Self::Vector) -> f32;
+}
+
+/// The components x, y and z of [`LANES`] consecutive nodes, where loads and stores are fastest: a load
+/// across two cache lines from a store before it can stall.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+pub(crate) struct Lanes3(pub(crate) [Lanes; 3]);
+
+/// The components x, y, z of one node and a number of no meaning.
+pub(crate) type Quad = [f32; 4];
+
+/// The sum over the lanes: the upper half is added to the lower half until one number is left.
+#[inline(always)]
+pub(crate) fn fold(mut lanes: Lanes) -> f32 {
+    let mut half = LANES / 2;
+    while half > 0 {
+        for lane in 0..half {
+            lanes[lane] += lanes[lane + half];
+        }
+        half /= 2;
+    }
+    lanes[0]
+}
