@@ -76,6 +76,12 @@ impl Simd {
     /// # Errors
     /// The machine lacks them.
     pub fn new(instructions: Instructions) -> Result<Self, Lacking> {
+        let widest = || Self::detect().instructions();
+        Self::have(instructions).ok_or_else(|| Lacking { asked: instructions, widest: widest() })
+    }
+
+    /// These instructions, if the machine has them.
+    fn have(instructions: Instructions) -> Option<Self> {
         let kind = match instructions {
             Instructions::Scalar => Some(Kind::Scalar),
             #[cfg(target_arch = "x86_64")]
@@ -85,8 +91,7 @@ impl Simd {
             #[cfg(not(target_arch = "x86_64"))]
             _ => None,
         };
-        let widest = || Self::detect().instructions();
-        kind.map(Self).ok_or_else(|| Lacking { asked: instructions, widest: widest() })
+        kind.map(Self)
     }
 
     /// The widest that the machine has.
@@ -97,7 +102,7 @@ impl Simd {
 
     /// All that the machine has, the widest last.
     pub fn available() -> impl Iterator<Item = Self> {
-        Instructions::ALL.into_iter().filter_map(|instructions| Self::new(instructions).ok())
+        Instructions::ALL.into_iter().filter_map(Self::have)
     }
 
     /// Which they are.
