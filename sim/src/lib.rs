@@ -19,7 +19,7 @@
 //! | §7.1.1: particles | [`scene`] |
 //! | §7.2: the pipeline and what it is compared with | [`executor`] |
 
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 pub mod behavior;
 pub mod block;
