@@ -125,6 +125,7 @@ fn bad_arguments() {
     refused(&["--frames", "0"], "--frames");
     refused(&["--frames-in-flight", "3"], "--frames-in-flight");
     refused(&["--executor", "magic"], "magic");
+    refused(&["--executor", "openmp-static"], "native-peers");
     refused(&["--nonsense"], "--nonsense");
     refused(&["nonsense"], "nonsense");
     refused(&["--window", "--headless"], "--window");

@@ -34,7 +34,7 @@ pub(super) fn run(args: &Particles, count: AllocationCounter<'_>) -> Result<Repo
         damping: true,
     };
     let settings = Settings {
-        executor: args.executor.into(),
+        executor: args.executor,
         threads: args.threads,
         pinned: false,
         grain: args.grain(),
@@ -96,7 +96,7 @@ fn report(args: &Particles, manager: &VeManager, measure: &Measure<'_>, speed_up
         quarantined.iter().filter(|(_, fault)| fault.kind == FaultKind::NonFinite).count();
     Report {
         scene: "particles",
-        executor: ExecutorKind::from(args.executor).name(),
+        executor: args.executor.name(),
         threads: args.threads,
         objects: args.objects,
         nodes,
