@@ -25,9 +25,12 @@ trait Queue: Sync {
     fn pop(&self) -> Option<u32>;
 }
 
+// Samples of a millisecond or more, so that threads that do not start together still meet.
 #[divan::bench(
     types = [Core, Crossbeam, Heapless, Concurrent, Locked],
     threads = [1, 2, 4],
+    sample_count = 50,
+    sample_size = 100_000,
 )]
 fn pop_and_push<Q: Queue>(bencher: Bencher<'_, '_>) {
     let queue = Q::new();
