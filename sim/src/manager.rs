@@ -8,6 +8,10 @@ use crate::executor::{
     RayonExecutor, RayonOverlappedExecutor, SerialExecutor, StageSeconds, StaticExecutor,
     state_hash,
 };
+#[cfg(feature = "native-peers")]
+use crate::executor::{
+    OpenMpDynamicExecutor, OpenMpStaticExecutor, TbbForExecutor, TbbPipelineExecutor,
+};
 use crate::message::Message;
 use crate::object::{Fault, Object, ObjectId};
 use crate::pool::{Pool, cores};
@@ -69,6 +73,18 @@ impl VeManager {
             ExecutorKind::RayonOverlapped => {
                 Box::new(RayonOverlappedExecutor::new(scene, grain, threads)?)
             }
+            #[cfg(feature = "native-peers")]
+            ExecutorKind::OpenMpStatic => {
+                Box::new(OpenMpStaticExecutor::new(scene, grain, threads)?)
+            }
+            #[cfg(feature = "native-peers")]
+            ExecutorKind::OpenMpDynamic => {
+                Box::new(OpenMpDynamicExecutor::new(scene, grain, threads)?)
+            }
+            #[cfg(feature = "native-peers")]
+            ExecutorKind::TbbFor => Box::new(TbbForExecutor::new(scene, grain, threads)?),
+            #[cfg(feature = "native-peers")]
+            ExecutorKind::TbbPipeline => Box::new(TbbPipelineExecutor::new(scene, grain, threads)?),
         };
         Ok(Self { executor, pool })
     }

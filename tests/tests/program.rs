@@ -144,6 +144,7 @@ fn bad_arguments() {
     refused(&["--frames-in-flight", "3"], "--frames-in-flight");
     refused(&["--executor", "magic"], "magic");
     refused(&["--simd", "magic"], "magic");
+    refused(&["--executor", "openmp-static"], "native-peers");
     refused(&["--nonsense"], "--nonsense");
     refused(&["nonsense"], "nonsense");
     refused(&["--window", "--headless"], "--window");

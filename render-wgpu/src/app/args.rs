@@ -53,9 +53,10 @@ pub(super) struct Particles {
     /// Let the particles fall.
     #[arg(long)]
     pub(super) gravity: bool,
-    /// What drives the stages.
-    #[arg(long, value_name = "NAME", value_enum, default_value_t = ExecutorName::Pipeline)]
-    pub(super) executor: ExecutorName,
+    #[arg(long, value_name = "NAME", default_value = ExecutorKind::Pipeline.name(),
+          value_parser = parse_executor,
+          help = format!("What drives the stages: {}", executor_names()))]
+    pub(super) executor: ExecutorKind,
     /// Blocks of close particles, or every modelled pair.
     #[arg(long, value_name = "KIND", value_enum, default_value_t = BroadPhaseName::Spatial)]
     broad_phase: BroadPhaseName,
@@ -82,27 +83,6 @@ pub(super) struct Particles {
     /// Write the report as JSON.
     #[arg(long, value_name = "FILE")]
     pub(super) json: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-pub(super) enum ExecutorName {
-    Pipeline,
-    Serial,
-    Static,
-    Rayon,
-    RayonOverlapped,
-}
-
-impl From<ExecutorName> for ExecutorKind {
-    fn from(name: ExecutorName) -> Self {
-        match name {
-            ExecutorName::Pipeline => Self::Pipeline,
-            ExecutorName::Serial => Self::Serial,
-            ExecutorName::Static => Self::Static,
-            ExecutorName::Rayon => Self::Rayon,
-            ExecutorName::RayonOverlapped => Self::RayonOverlapped,
-        }
-    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -153,6 +133,25 @@ fn parse_objects(text: &str) -> Result<usize, String> {
 
 fn parse_threads(text: &str) -> Result<usize, String> {
     parse_number(text, MAX_THREADS)
+}
+
+/// Executors that a program built without them still knows by name.
+const NATIVE_PEERS: [&str; 4] = ["openmp-static", "openmp-dynamic", "tbb-for", "tbb-pipeline"];
+
+fn parse_executor(text: &str) -> Result<ExecutorKind, String> {
+    let known = ExecutorKind::ALL.iter().find(|kind| kind.name() == text);
+    known.copied().ok_or_else(|| {
+        if NATIVE_PEERS.contains(&text) {
+            "this program was built without the feature `native-peers`".to_owned()
+        } else {
+            format!("there are {}", executor_names())
+        }
+    })
+}
+
+fn executor_names() -> String {
+    let names: Vec<_> = ExecutorKind::ALL.iter().map(|kind| kind.name()).collect();
+    names.join(", ")
 }
 
 fn parse_number(text: &str, most: usize) -> Result<usize, String> {

@@ -39,7 +39,7 @@ pub(super) fn run(args: &Particles, count: AllocationCounter<'_>) -> Result<Repo
         Ok::<_, SceneError>(scene)
     };
     let settings = Settings {
-        executor: args.executor.into(),
+        executor: args.executor,
         threads: args.threads,
         pinned: false,
         grain: args.grain(),
@@ -101,7 +101,7 @@ fn report(args: &Particles, manager: &VeManager, measure: &Measure<'_>, speed_up
         quarantined.iter().filter(|(_, fault)| fault.kind == FaultKind::NonFinite).count();
     Report {
         scene: "particles",
-        executor: ExecutorKind::from(args.executor).name(),
+        executor: args.executor.name(),
         threads: args.threads,
         simd: args.simd().instructions().name(),
         objects: args.objects,

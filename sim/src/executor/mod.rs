@@ -5,7 +5,11 @@
 
 mod barrier;
 mod clock;
+mod engine;
 mod mail;
+#[cfg(feature = "native-peers")]
+mod native;
+mod parallel_for;
 mod pipeline;
 mod rayon;
 mod rayon_overlapped;
@@ -23,9 +27,14 @@ use crate::object::{Object, ObjectId};
 use crate::render::Renderer;
 use crate::stages::PairCount;
 
-pub use self::rayon::RayonExecutor;
+pub use self::rayon::{RayonExecutor, RayonLoops};
 pub use clock::{Stage, StageSeconds};
 pub use mail::{Letter, Mail};
+#[cfg(feature = "native-peers")]
+pub use native::{
+    OpenMpDynamicExecutor, OpenMpStaticExecutor, TbbForExecutor, TbbPipelineExecutor,
+};
+pub use parallel_for::{LoopExecutor, ParallelFor};
 pub use pipeline::{Entry, PipelineExecutor};
 pub use rayon_overlapped::RayonOverlappedExecutor;
 pub use serial::SerialExecutor;
@@ -45,9 +54,38 @@ pub enum ExecutorKind {
     Rayon,
     /// As [`ExecutorKind::Rayon`], but a copy of each frame is rendered beside the next frame.
     RayonOverlapped,
+    /// OpenMP's `schedule(static)`, stage after stage.
+    #[cfg(feature = "native-peers")]
+    OpenMpStatic,
+    /// OpenMP's `schedule(dynamic)`, stage after stage.
+    #[cfg(feature = "native-peers")]
+    OpenMpDynamic,
+    /// oneTBB's `parallel_for`, stage after stage.
+    #[cfg(feature = "native-peers")]
+    TbbFor,
+    /// oneTBB's `parallel_pipeline`, with rendering beside updates.
+    #[cfg(feature = "native-peers")]
+    TbbPipeline,
 }
 
 impl ExecutorKind {
+    /// Every way, the pipeline first.
+    pub const ALL: &'static [Self] = &[
+        Self::Pipeline,
+        Self::Serial,
+        Self::Static,
+        Self::Rayon,
+        Self::RayonOverlapped,
+        #[cfg(feature = "native-peers")]
+        Self::OpenMpStatic,
+        #[cfg(feature = "native-peers")]
+        Self::OpenMpDynamic,
+        #[cfg(feature = "native-peers")]
+        Self::TbbFor,
+        #[cfg(feature = "native-peers")]
+        Self::TbbPipeline,
+    ];
+
     /// The name by which the program knows it.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -57,6 +95,14 @@ impl ExecutorKind {
             Self::Static => "static",
             Self::Rayon => "rayon",
             Self::RayonOverlapped => "rayon-overlapped",
+            #[cfg(feature = "native-peers")]
+            Self::OpenMpStatic => "openmp-static",
+            #[cfg(feature = "native-peers")]
+            Self::OpenMpDynamic => "openmp-dynamic",
+            #[cfg(feature = "native-peers")]
+            Self::TbbFor => "tbb-for",
+            #[cfg(feature = "native-peers")]
+            Self::TbbPipeline => "tbb-pipeline",
         }
     }
 }

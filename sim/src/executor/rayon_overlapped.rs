@@ -4,10 +4,10 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use rayon::ThreadPool;
-
 use super::clock::{Stage, StageSeconds};
-use super::rayon::{Engine, pool};
+use super::engine::Engine;
+use super::parallel_for::ParallelFor;
+use super::rayon::RayonLoops;
 use super::{Executor, ExecutorError, FrameRecord, world};
 use crate::block::Block;
 use crate::blocking::Grain;
@@ -24,7 +24,7 @@ use crate::stages::{PairCount, draw};
 /// [`RayonExecutor`]: super::RayonExecutor
 pub struct RayonOverlappedExecutor {
     engine: Engine,
-    pool: ThreadPool,
+    loops: RayonLoops,
     pictures: Vec<Picture>,
     running: Duration,
 }
@@ -44,7 +44,7 @@ impl RayonOverlappedExecutor {
         let engine = Engine::new(scene, grain, threads)?;
         let mut pictures = Vec::with_capacity(PICTURES);
         pictures.resize_with(PICTURES, || picture(&engine.world.blocks));
-        Ok(Self { engine, pool: pool(threads)?, pictures, running: Duration::ZERO })
+        Ok(Self { engine, loops: RayonLoops::new(threads)?, pictures, running: Duration::ZERO })
     }
 }
 
@@ -63,10 +63,10 @@ impl Executor for RayonOverlappedExecutor {
         for picture in self.pictures.drain(..) {
             give_back(&used, picture);
         }
-        let (engine, pool) = (&mut self.engine, &self.pool);
+        let (engine, loops) = (&mut self.engine, &self.loops);
         let mut render_time = Duration::ZERO;
         let unused = std::thread::scope(|scope| {
-            let work = move || pool.install(|| compute(engine, frames, unused, &taken_in));
+            let work = move || loops.enter(|| compute(engine, loops, frames, unused, &taken_in));
             let computing = scope.spawn(work);
             // Both ends are dropped if the renderer panics, so that nobody waits for it then.
             let (used, taken_out) = (used, taken_out);
@@ -123,6 +123,7 @@ fn picture(blocks: &[Block]) -> Picture {
 /// Computes frames and takes a picture of each, until nobody wants them any more.
 fn compute(
     engine: &mut Engine,
+    loops: &RayonLoops,
     frames: u64,
     unused: Receiver<Picture>,
     taken: &SyncSender<Taken>,
@@ -130,7 +131,7 @@ fn compute(
     for _ in 0..frames {
         let Ok(picture) = unused.recv() else { break };
         let frame = engine.frame;
-        let pairs = engine.compute(|index, block| copy(block, &picture[index]));
+        let pairs = engine.compute(loops, |index, block| copy(block, &picture[index]));
         if taken.send(Taken { frame, pairs, picture }).is_err() {
             break;
         }

@@ -44,7 +44,7 @@ impl SerialExecutor {
             found: world::found_list(),
             candidates: Candidates::new(blocks),
             outcomes: (0..world::first_outcomes(blocks)).map(|_| Outcome::new()).collect(),
-            outbox: world::outbox(),
+            outbox: world::outbox(blocks),
             mail: Mail::new(),
             scratch: Scratch::new(),
             clock: Clock::default(),

@@ -8,9 +8,10 @@ use std::time::{Duration, Instant};
 
 use super::barrier::Barrier;
 use super::clock::{Clock, Stage, StageSeconds};
+use super::engine::check_threads;
 use super::mail::Mail;
 use super::world::{self, Candidates, Outbox, Outcome, Partners, World};
-use super::{Executor, ExecutorError, FrameRecord, MAX_THREADS};
+use super::{Executor, ExecutorError, FrameRecord};
 use crate::block::Block;
 use crate::blocking::{Blocking, Grain};
 use crate::geometry::Bounds;
@@ -61,9 +62,7 @@ impl StaticExecutor {
     /// # Errors
     /// No or too many threads, objects that cannot be grouped, or a thread that cannot be started.
     pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
-        if !(1..=MAX_THREADS).contains(&threads) {
-            return Err(ExecutorError::Threads { threads });
-        }
+        check_threads(threads)?;
         let world = World::new(scene, grain, threads)?;
         let count = world.blocks.len();
         let outcome = |_| RwLock::new(Outcome::new());
@@ -78,7 +77,7 @@ impl StaticExecutor {
             partners: world.partners,
             blocks: world.blocks.into_iter().map(RwLock::new).collect(),
             found: (0..count).map(|_| Mutex::new(world::found_list())).collect(),
-            outboxes: (0..count).map(|_| Mutex::new(world::outbox())).collect(),
+            outboxes: (0..count).map(|_| Mutex::new(world::outbox(1))).collect(),
             plan: RwLock::new(plan),
             barrier: Barrier::new(threads),
             clocks: (0..threads).map(|_| Clock::default()).collect(),

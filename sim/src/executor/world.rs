@@ -193,9 +193,9 @@ pub(super) fn first_outcomes(blocks: usize) -> usize {
 /// What the objects of a block sent in a frame, as (from, to, message).
 pub(super) type Outbox = Vec<(ObjectId, ObjectId, Message)>;
 
-/// An empty outbox.
-pub(super) fn outbox() -> Outbox {
-    Vec::with_capacity(LETTERS_PER_BLOCK)
+/// An empty outbox for so many blocks.
+pub(super) fn outbox(blocks: usize) -> Outbox {
+    Vec::with_capacity(blocks * LETTERS_PER_BLOCK)
 }
 
 /// Moves what was sent to the next frame's mail.

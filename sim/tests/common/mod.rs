@@ -12,6 +12,10 @@ use dualframe_sim::executor::{
     Entry, Executor, PipelineExecutor, RayonExecutor, RayonOverlappedExecutor, SerialExecutor,
     StaticExecutor, state_hash,
 };
+#[cfg(feature = "native-peers")]
+use dualframe_sim::executor::{
+    OpenMpDynamicExecutor, OpenMpStaticExecutor, TbbForExecutor, TbbPipelineExecutor,
+};
 use dualframe_sim::geometry::{Geometry, Mesh, Topology};
 use dualframe_sim::interaction::{ContactBuffer, Rules, Scratch};
 use dualframe_sim::object::{Group, Object, ObjectId};
@@ -48,6 +52,17 @@ pub(crate) fn executors(
         ("static", Box::new(StaticExecutor::new(scene(), grain, threads).expect(ok))),
         ("rayon", Box::new(RayonExecutor::new(scene(), grain, threads).expect(ok))),
         ("overlapped", Box::new(RayonOverlappedExecutor::new(scene(), grain, threads).expect(ok))),
+        #[cfg(feature = "native-peers")]
+        ("openmp static", Box::new(OpenMpStaticExecutor::new(scene(), grain, threads).expect(ok))),
+        #[cfg(feature = "native-peers")]
+        (
+            "openmp dynamic",
+            Box::new(OpenMpDynamicExecutor::new(scene(), grain, threads).expect(ok)),
+        ),
+        #[cfg(feature = "native-peers")]
+        ("tbb for", Box::new(TbbForExecutor::new(scene(), grain, threads).expect(ok))),
+        #[cfg(feature = "native-peers")]
+        ("tbb pipeline", Box::new(TbbPipelineExecutor::new(scene(), grain, threads).expect(ok))),
     ]
 }
 

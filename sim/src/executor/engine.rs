@@ -1,0 +1,164 @@
+//! The stages up to update as parallel loops.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use super::clock::{Clock, Stage, StageSeconds, Timer};
+use super::mail::Mail;
+use super::parallel_for::ParallelFor;
+use super::world::{self, Candidates, Outbox, Outcome, World};
+use super::{ExecutorError, MAX_THREADS};
+use crate::block::Block;
+use crate::blocking::Grain;
+use crate::geometry::Bounds;
+use crate::interaction::Scratch;
+use crate::scene::Scene;
+use crate::stages::PairCount;
+
+/// An environment that is computed loop by loop.
+pub(super) struct Engine {
+    pub(super) world: World,
+    pub(super) mail: Mail,
+    pub(super) workers: Vec<Worker>,
+    pub(super) frame: u64,
+    bounds: Vec<Bounds>,
+    found: Vec<Vec<u32>>,
+    candidates: Candidates,
+    outcomes: Vec<Outcome>,
+}
+
+/// What belongs to one thread. The locks are never contended.
+pub(super) struct Worker {
+    pub(super) clock: Clock,
+    scratch: Mutex<Scratch>,
+    outbox: Mutex<Outbox>,
+}
+
+impl Worker {
+    /// What belongs to a thread that may have to update all of so many blocks.
+    pub(super) fn new(blocks: usize) -> Self {
+        let outbox = Mutex::new(world::outbox(blocks));
+        Self { clock: Clock::default(), scratch: Mutex::default(), outbox }
+    }
+
+    /// What interactions need, and their time.
+    pub(super) fn begin_interaction(&self) -> (Timer<'_>, MutexGuard<'_, Scratch>) {
+        (self.clock.time(Stage::Interaction), lock(&self.scratch))
+    }
+
+    /// What updates need, and their time.
+    pub(super) fn begin_update(&self) -> (Timer<'_>, MutexGuard<'_, Outbox>) {
+        (self.clock.time(Stage::Update), lock(&self.outbox))
+    }
+
+    /// Moves what was sent to the next frame's mail.
+    pub(super) fn collect(workers: &[Self], mail: &mut Mail) {
+        for worker in workers {
+            world::empty_into(&mut lock(&worker.outbox), mail);
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Whether there can be so many threads.
+pub(super) fn check_threads(threads: usize) -> Result<(), ExecutorError> {
+    match (1..=MAX_THREADS).contains(&threads) {
+        true => Ok(()),
+        false => Err(ExecutorError::Threads { threads }),
+    }
+}
+
+impl Engine {
+    pub(super) fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
+        check_threads(threads)?;
+        let world = World::new(scene, grain, threads)?;
+        let blocks = world.blocks.len();
+        Ok(Self {
+            mail: Mail::new(),
+            workers: (0..threads).map(|_| Worker::new(blocks)).collect(),
+            frame: 0,
+            bounds: Vec::with_capacity(blocks),
+            found: (0..blocks).map(|_| world::found_list()).collect(),
+            candidates: Candidates::new(blocks),
+            outcomes: (0..world::first_outcomes(blocks)).map(|_| Outcome::new()).collect(),
+            world,
+        })
+    }
+
+    /// Computes the next frame. `updated` is shown each block right after its update.
+    pub(super) fn compute(
+        &mut self,
+        loops: &impl ParallelFor,
+        updated: impl Fn(usize, &Block) + Sync + Send,
+    ) -> PairCount {
+        if self.world.regroups_before(self.frame) {
+            self.world.regroup();
+        }
+        self.mail.turn();
+        self.broad_phase(loops);
+        let pairs = self.interact(loops);
+        self.update(loops, updated);
+        self.frame += 1;
+        pairs
+    }
+
+    fn broad_phase(&mut self, loops: &impl ParallelFor) {
+        let World { stages, blocks, partners, .. } = &self.world;
+        self.bounds.clear();
+        self.bounds.extend(blocks.iter().map(Block::bounds));
+        let (bounds, workers) = (&self.bounds, &self.workers);
+        let begin = |worker: usize| workers[worker].clock.time(Stage::BroadPhase);
+        loops.for_each(&mut self.found, begin, |_timer, first, found| {
+            let may_touch = |second: usize| {
+                let (first, second) = world::pair(blocks, [first as u32, second as u32]);
+                world::may_touch(stages, first, second)
+            };
+            partners.find(first, bounds, may_touch, found);
+        });
+        self.candidates.clear();
+        for (first, found) in self.found.iter().enumerate() {
+            self.candidates.extend(first, found);
+        }
+    }
+
+    fn interact(&mut self, loops: &impl ParallelFor) -> PairCount {
+        let World { stages, blocks, .. } = &self.world;
+        let pairs = &self.candidates.pairs;
+        if self.outcomes.len() < pairs.len() {
+            self.outcomes.resize_with(pairs.len(), Outcome::new);
+        }
+        let workers = &self.workers;
+        let outcomes = &mut self.outcomes[..pairs.len()];
+        let begin = |worker: usize| workers[worker].begin_interaction();
+        loops.for_each(outcomes, begin, |(_timer, scratch), place, outcome| {
+            let (first, second) = world::pair(blocks, pairs[place]);
+            outcome.compute(stages, first, second, scratch);
+        });
+        outcomes.iter().fold(PairCount::default(), |mut sum, outcome| {
+            sum += outcome.pairs;
+            sum
+        })
+    }
+
+    fn update(&mut self, loops: &impl ParallelFor, updated: impl Fn(usize, &Block) + Sync + Send) {
+        let World { stages, blocks, .. } = &mut self.world;
+        let (candidates, outcomes, workers) = (&self.candidates, &self.outcomes, &self.workers);
+        let (frame, mail) = (self.frame, &self.mail);
+        let begin = |worker: usize| workers[worker].begin_update();
+        loops.for_each(blocks, begin, |(_timer, outbox), index, block| {
+            let outcomes = candidates.of_block(index).map(|place| &outcomes[place]);
+            outcomes.flat_map(Outcome::segments).for_each(|segment| block.receive(segment));
+            let mut post = |from, to, message| outbox.push((from, to, message));
+            stages.update(frame, block, mail.letters(), &mut post);
+            updated(index, block);
+        });
+        Worker::collect(&self.workers, &mut self.mail);
+    }
+
+    pub(super) fn stage_seconds(&self, running: Duration) -> Vec<StageSeconds> {
+        self.workers.iter().map(|worker| worker.clock.seconds(running)).collect()
+    }
+}

@@ -1,0 +1,201 @@
+//! oneTBB's `parallel_pipeline`.
+
+use std::time::{Duration, Instant};
+
+use send_wrapper::SendWrapper;
+
+use super::super::clock::{Stage, StageSeconds};
+use super::super::engine::{Worker, check_threads};
+use super::super::mail::Mail;
+use super::super::parallel_for::ParallelFor;
+use super::super::world::{self, Candidates, Outcome, World};
+use super::super::{Executor, ExecutorError, FrameRecord};
+use super::shim::Tbb;
+use crate::block::Block;
+use crate::blocking::Grain;
+use crate::geometry::Bounds;
+use crate::message::Message;
+use crate::object::{Object, ObjectId};
+use crate::render::Renderer;
+use crate::scene::Scene;
+use crate::stages::PairCount;
+
+/// Two oneTBB pipelines a frame: blocks are searched for partners and interact with them, in
+/// parallel, and what that gave is listed in order; then blocks are updated, in parallel, and rendered
+/// in order, beside the updates of later blocks.
+///
+/// They cannot be one: an update needs the interactions of blocks that come after it, and a filter
+/// knows only its own token.
+///
+/// oneTBB runs a serial filter on any thread, and has no filter that is bound to one any more; a
+/// renderer belongs to the calling thread. So the render filter renders when the calling thread comes
+/// by, everything that has been updated so far; otherwise it leaves its block to the next time. What
+/// is left in the end the calling thread renders behind the pipeline.
+pub struct TbbPipelineExecutor {
+    world: World,
+    arena: Tbb,
+    mail: Mail,
+    workers: Vec<Worker>,
+    bounds: Vec<Bounds>,
+    searches: Vec<Search>,
+    candidates: Candidates,
+    /// For each block the place of its first search result among the candidates.
+    first_places: Vec<usize>,
+    running: Duration,
+    frame: u64,
+}
+
+/// What the first pipeline finds for a block: its partners, and what interacting with each gave.
+struct Search {
+    found: Vec<u32>,
+    outcomes: Vec<Outcome>,
+}
+
+impl TbbPipelineExecutor {
+    /// Takes over a scene.
+    ///
+    /// # Errors
+    /// No or too many threads, or objects that cannot be grouped.
+    pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
+        check_threads(threads)?;
+        let world = World::new(scene, grain, threads)?;
+        let blocks = world.blocks.len();
+        Ok(Self {
+            arena: Tbb::new(threads)?,
+            mail: Mail::new(),
+            workers: (0..threads).map(|_| Worker::new(blocks)).collect(),
+            bounds: Vec::with_capacity(blocks),
+            searches: (0..blocks).map(|_| Search::new()).collect(),
+            candidates: Candidates::new(blocks),
+            first_places: Vec::with_capacity(blocks),
+            running: Duration::ZERO,
+            frame: 0,
+            world,
+        })
+    }
+
+    fn prepare(&mut self) {
+        if self.world.regroups_before(self.frame) {
+            self.world.regroup();
+        }
+        self.mail.turn();
+        self.bounds.clear();
+        self.bounds.extend(self.world.blocks.iter().map(Block::bounds));
+    }
+
+    /// The first pipeline.
+    fn interact(&mut self) -> PairCount {
+        let Self { world, workers, bounds, candidates, first_places, .. } = self;
+        let mut pairs = PairCount::default();
+        candidates.clear();
+        first_places.clear();
+        self.arena.pipeline(
+            &mut self.searches,
+            |worker, first, search| search.run(world, bounds, first, &workers[worker]),
+            |_, first, search| {
+                first_places.push(candidates.pairs.len());
+                candidates.extend(first, &search.found);
+                search.outcomes().for_each(|outcome| pairs += outcome.pairs);
+            },
+        );
+        pairs
+    }
+
+    /// The second pipeline.
+    fn update(&mut self, renderer: &mut dyn Renderer) {
+        let Self { searches, workers, candidates, first_places, frame, mail, .. } = self;
+        let World { stages, blocks, .. } = &mut self.world;
+        let outcome = |place: usize| {
+            let first = candidates.pairs[place][0] as usize;
+            &searches[first].outcomes[place - first_places[first]]
+        };
+        let work = |worker: usize, index: usize, block: &mut Block| {
+            let (_timer, mut outbox) = workers[worker].begin_update();
+            let segments = candidates.of_block(index).map(outcome).flat_map(Outcome::segments);
+            segments.for_each(|segment| block.receive(segment));
+            let mut post = |from, to, message| outbox.push((from, to, message));
+            stages.update(*frame, block, mail.letters(), &mut post);
+        };
+        let mut waiting: Vec<&Block> = Vec::with_capacity(blocks.len());
+        let mut screen = SendWrapper::new(renderer);
+        self.arena.pipeline(blocks, work, |worker, _, block| {
+            waiting.push(block);
+            if screen.valid() {
+                let _timer = workers[worker].clock.time(Stage::Render);
+                waiting.drain(..).for_each(|block| stages.render(block, &mut **screen));
+            }
+        });
+        let _timer = workers[0].clock.time(Stage::Render);
+        waiting.drain(..).for_each(|block| stages.render(block, &mut **screen));
+        screen.swap(*frame);
+        Worker::collect(workers, mail);
+    }
+}
+
+impl Search {
+    fn new() -> Self {
+        let outcomes = (0..world::first_outcomes(1)).map(|_| Outcome::new()).collect();
+        Self { found: world::found_list(), outcomes }
+    }
+
+    /// Finds the partners of block `first`, and lets it interact with them.
+    fn run(&mut self, world: &World, bounds: &[Bounds], first: usize, worker: &Worker) {
+        let World { stages, blocks, partners, .. } = world;
+        let pair = |second: usize| world::pair(blocks, [first as u32, second as u32]);
+        let timer = worker.clock.time(Stage::BroadPhase);
+        let may_touch = |second| {
+            let (first, second) = pair(second);
+            world::may_touch(stages, first, second)
+        };
+        partners.find(first, bounds, may_touch, &mut self.found);
+        drop(timer);
+        if self.outcomes.len() < self.found.len() {
+            self.outcomes.resize_with(self.found.len(), Outcome::new);
+        }
+        let (_timer, mut scratch) = worker.begin_interaction();
+        for (&second, outcome) in self.found.iter().zip(&mut self.outcomes) {
+            let (first, second) = pair(second as usize);
+            outcome.compute(stages, first, second, &mut scratch);
+        }
+    }
+
+    fn outcomes(&self) -> impl Iterator<Item = &Outcome> {
+        self.outcomes.iter().take(self.found.len())
+    }
+}
+
+impl Executor for TbbPipelineExecutor {
+    fn advance(
+        &mut self,
+        frames: u64,
+        renderer: &mut dyn Renderer,
+        on_frame: &mut dyn FnMut(&FrameRecord),
+    ) -> Result<(), ExecutorError> {
+        let began = Instant::now();
+        for _ in 0..frames {
+            self.prepare();
+            let pairs = self.interact();
+            self.update(renderer);
+            on_frame(&FrameRecord { frame: self.frame, swapped: Instant::now(), pairs });
+            self.frame += 1;
+        }
+        self.running += began.elapsed();
+        Ok(())
+    }
+
+    fn frame(&self) -> u64 {
+        self.frame
+    }
+
+    fn visit(&self, visit: &mut dyn FnMut(&Object)) {
+        world::visit(&self.world.blocks, visit);
+    }
+
+    fn post(&mut self, to: ObjectId, message: Message) {
+        self.mail.collect(ObjectId::HOST, to, message);
+    }
+
+    fn stage_seconds(&self) -> Vec<StageSeconds> {
+        self.workers.iter().map(|worker| worker.clock.seconds(self.running)).collect()
+    }
+}

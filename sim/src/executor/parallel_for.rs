@@ -1,0 +1,99 @@
+//! Stage after stage, each a parallel loop.
+
+use std::time::{Duration, Instant};
+
+use super::clock::{Stage, StageSeconds};
+use super::engine::Engine;
+use super::{Executor, ExecutorError, FrameRecord, world};
+use crate::blocking::Grain;
+use crate::message::Message;
+use crate::object::{Object, ObjectId};
+use crate::render::Renderer;
+use crate::scene::Scene;
+
+/// Parallel loops on a fixed number of threads.
+pub trait ParallelFor: Sized + Sync {
+    /// Loops on so many threads, at least 1.
+    ///
+    /// # Errors
+    /// The threads cannot be had.
+    fn new(threads: usize) -> Result<Self, ExecutorError>;
+
+    /// Does `work` where loops are begun at the least cost.
+    fn enter<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+        work()
+    }
+
+    /// Calls `body` with every item and its place, once. A thread that takes up some items calls
+    /// `begin` first, with its number, below the number of threads; what it gives is kept until the
+    /// thread has done them. A number belongs to one thread at a time.
+    ///
+    /// # Panics
+    /// If `body` does.
+    fn for_each<T: Send, S>(
+        &self,
+        items: &mut [T],
+        begin: impl Fn(usize) -> S + Sync + Send,
+        body: impl Fn(&mut S, usize, &mut T) + Sync + Send,
+    );
+}
+
+/// Broad phase, interaction and update as a parallel loop each; then the calling thread renders.
+pub struct LoopExecutor<P> {
+    engine: Engine,
+    loops: P,
+    running: Duration,
+}
+
+impl<P: ParallelFor> LoopExecutor<P> {
+    /// Takes over a scene.
+    ///
+    /// # Errors
+    /// No or too many threads, objects that cannot be grouped, or threads that cannot be had.
+    pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
+        let engine = Engine::new(scene, grain, threads)?;
+        Ok(Self { engine, loops: P::new(threads)?, running: Duration::ZERO })
+    }
+}
+
+impl<P: ParallelFor> Executor for LoopExecutor<P> {
+    fn advance(
+        &mut self,
+        frames: u64,
+        renderer: &mut dyn Renderer,
+        on_frame: &mut dyn FnMut(&FrameRecord),
+    ) -> Result<(), ExecutorError> {
+        let began = Instant::now();
+        for _ in 0..frames {
+            let (engine, loops) = (&mut self.engine, &self.loops);
+            let frame = engine.frame;
+            let pairs = loops.enter(|| engine.compute(loops, |_, _| ()));
+            {
+                let _timer = self.engine.workers[0].clock.time(Stage::Render);
+                for block in &self.engine.world.blocks {
+                    self.engine.world.stages.render(block, renderer);
+                }
+                renderer.swap(frame);
+            }
+            on_frame(&FrameRecord { frame, swapped: Instant::now(), pairs });
+        }
+        self.running += began.elapsed();
+        Ok(())
+    }
+
+    fn frame(&self) -> u64 {
+        self.engine.frame
+    }
+
+    fn visit(&self, visit: &mut dyn FnMut(&Object)) {
+        world::visit(&self.engine.world.blocks, visit);
+    }
+
+    fn post(&mut self, to: ObjectId, message: Message) {
+        self.engine.mail.collect(ObjectId::HOST, to, message);
+    }
+
+    fn stage_seconds(&self) -> Vec<StageSeconds> {
+        self.engine.stage_seconds(self.running)
+    }
+}
