@@ -18,6 +18,7 @@
 //! | §6.2: messages | [`message`] |
 //! | §7.1.1: particles | [`scene`] |
 //! | §7.2: the pipeline and what it is compared with | [`executor`] |
+//! | §7–§8: Eqs. 2–4, Figs. 11–17, Table 1 | `experiment`, with the feature of that name |
 
 #![forbid(unsafe_code)]
 
@@ -25,6 +26,8 @@ pub mod behavior;
 pub mod block;
 pub mod blocking;
 pub mod executor;
+#[cfg(feature = "experiment")]
+pub mod experiment;
 pub mod geometry;
 pub mod interaction;
 pub mod manager;

@@ -48,6 +48,10 @@ pub enum ExecutorKind {
 }
 
 impl ExecutorKind {
+    /// Every way, the pipeline first.
+    pub const ALL: &'static [Self] =
+        &[Self::Pipeline, Self::Serial, Self::Static, Self::Rayon, Self::RayonOverlapped];
+
     /// The name by which the program knows it.
     #[must_use]
     pub fn name(self) -> &'static str {
