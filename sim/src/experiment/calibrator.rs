@@ -44,10 +44,7 @@ impl Phase {
     /// The worse of two, in both respects.
     #[must_use]
     pub fn worse(self, other: Self) -> Self {
-        Self {
-            gain: self.gain.min(other.gain),
-            ping_pong: self.ping_pong.max(other.ping_pong),
-        }
+        Self { gain: self.gain.min(other.gain), ping_pong: self.ping_pong.max(other.ping_pong) }
     }
 
     /// Whether a round in this phase is to be marked, if the best ping-pong took `best` nanoseconds.

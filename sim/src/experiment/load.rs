@@ -27,6 +27,15 @@ pub enum RenderLoad {
 }
 
 impl RenderLoad {
+    /// What it is called in tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Null => "null",
+            Self::StandIn(_) => "stand-in",
+        }
+    }
+
     /// The renderer of a run.
     #[must_use]
     pub fn renderer(self) -> Box<dyn Renderer> {

@@ -37,7 +37,10 @@ impl fmt::Display for Machine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { processor, cores, system, architecture, kernel_width } = self;
         let plural = if *cores == 1 { "" } else { "s" };
-        write!(f, "{processor}, {cores} core{plural}, {system} {architecture}, kernels {kernel_width}")
+        write!(
+            f,
+            "{processor}, {cores} core{plural}, {system} {architecture}, kernels {kernel_width}"
+        )
     }
 }
 

@@ -1,12 +1,14 @@
 //! Runs of one environment, timed against each other.
 
 use std::cell::{Cell, RefCell};
+use std::fmt;
 use std::time::{Duration, Instant};
 
+use super::calibrator::Phase;
 use super::error::ExperimentError;
 use super::load::RenderLoad;
+use super::outcome::Outcome;
 use super::timing::{Contender, Series};
-use super::calibrator::Phase;
 use crate::executor::{ExecutorKind, FrameRecord};
 use crate::manager::{Settings, VeManager};
 use crate::scene::ParticleScene;
@@ -46,7 +48,7 @@ impl Runner {
         format!("{} × {}", self.executor.name(), self.threads)
     }
 
-    fn settings(self) -> Settings {
+    pub(super) fn settings(self) -> Settings {
         Settings { executor: self.executor, threads: self.threads, ..Settings::default() }
     }
 
@@ -71,6 +73,14 @@ pub struct Race {
     pub rounds: usize,
 }
 
+impl fmt::Display for Race {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { scene, load, frames, .. } = self;
+        write!(f, "{} objects, seed {}, ", scene.objects, scene.seed)?;
+        write!(f, "render {}, {frames} frames", load.name())
+    }
+}
+
 /// What a race tells while it goes on.
 pub(super) type OnFrame<'a> = dyn FnMut(usize, &FrameRecord, Duration) + 'a;
 
@@ -86,7 +96,7 @@ impl Race {
         runners: &[Runner],
         phase: &mut dyn FnMut() -> Phase,
         done: &mut dyn FnMut(),
-    ) -> Result<Series, ExperimentError> {
+    ) -> Result<Outcome, ExperimentError> {
         self.observed(runners, phase, done, &mut |_, _, _| ())
     }
 
@@ -98,7 +108,7 @@ impl Race {
         phase: &mut dyn FnMut() -> Phase,
         done: &mut dyn FnMut(),
         on_frame: &mut OnFrame<'_>,
-    ) -> Result<Series, ExperimentError> {
+    ) -> Result<Outcome, ExperimentError> {
         let expected = Cell::new(None);
         let on_frame = RefCell::new(on_frame);
         let contender = |(index, &runner): (usize, &Runner)| {
@@ -109,8 +119,19 @@ impl Race {
             };
             Contender { label: runner.label(), spins: runner.spins(), run: Box::new(run) }
         };
-        let mut contenders: Vec<Contender<'_>> = runners.iter().enumerate().map(contender).collect();
-        Series::measure(&mut contenders, self.rounds, phase, done)
+        let mut contenders: Vec<Contender<'_>> =
+            runners.iter().enumerate().map(contender).collect();
+        let series = Series::measure(&mut contenders, self.rounds, phase, done)?;
+        drop(contenders);
+        Ok(Outcome { race: *self, runners: runners.to_vec(), series })
+    }
+
+    /// Seconds of one run.
+    ///
+    /// # Errors
+    /// The environment cannot be built or run, or an object was quarantined.
+    pub fn seconds(&self, runner: Runner) -> Result<f64, ExperimentError> {
+        self.once(runner, &Cell::new(None), &mut |_, _| ())
     }
 
     /// Seconds of one run, which must end in the expected state, if one is known.
@@ -169,12 +190,13 @@ mod tests {
             std::iter::once(Runner::SERIAL).chain(Runner::parallel(2)).collect();
         let mut runs = 0;
         let mut frames = vec![Vec::new(); runners.len()];
-        let mut on_frame = |runner: usize, record: &FrameRecord, _| frames[runner].push(record.frame);
-        let series = race
+        let mut on_frame =
+            |runner: usize, record: &FrameRecord, _| frames[runner].push(record.frame);
+        let outcome = race
             .observed(&runners, &mut || GOOD, &mut || runs += 1, &mut on_frame)
             .expect("a valid race");
         assert_eq!(runs, 2 * ExecutorKind::ALL.len());
-        assert_eq!(series.labels()[..2], ["serial × 1", "pipeline × 2"]);
+        assert_eq!(outcome.series.labels()[..2], ["serial × 1", "pipeline × 2"]);
         assert!(frames.iter().all(|frames| *frames == [2, 3, 4, 2, 3, 4]), "{frames:?}");
     }
 
