@@ -157,8 +157,8 @@ fn bad_experiments() {
     refused(&["experiment", "nonsense", "--out", out], "nonsense");
     refused(&["experiment", "all", "--nonsense", "--out", out], "--nonsense");
     refused(&["experiment", "all", "more", "--out", out], "more");
-    refused(&["experiment", "all"], "required");
-    refused(&["experiment", "--out", out], "required");
+    refused(&["experiment", "all"], "--out");
+    refused(&["experiment", "--out", out], "scalability|load-balance");
     assert!(!Path::new(out).exists());
 }
 

@@ -228,8 +228,14 @@ fn refuse(error: &clap::Error) -> Outcome {
         let _printed = error.print();
         return Outcome::Told;
     }
-    // The first line says what is wrong; the rest is usage.
+    // The first line says what is wrong, or ends in a colon and the next ones say it; then comes usage.
     let text = error.to_string();
-    let line = text.lines().next().unwrap_or("bad arguments");
-    Outcome::Bad(line.strip_prefix("error: ").unwrap_or(line).to_owned())
+    let mut lines = text.lines();
+    let mut line = lines.next().unwrap_or("bad arguments").to_owned();
+    if line.ends_with(':') {
+        for item in lines.map(str::trim).take_while(|item| !item.is_empty()) {
+            line = line + " " + item;
+        }
+    }
+    Outcome::Bad(line.strip_prefix("error: ").unwrap_or(&line).to_owned())
 }

@@ -1,11 +1,12 @@
 //! `dualframe experiment`.
 
 use std::fs;
+use std::io::{self, Write};
 use std::path::Path;
 
 use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::machine::Machine;
-use dualframe_sim::experiment::{self, PAGE};
+use dualframe_sim::experiment::{self, PAGE, Report};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::args::ExperimentArgs;
@@ -23,18 +24,24 @@ pub(super) fn prepare(out: &Path) -> Result<(), String> {
 pub(super) fn run(args: &ExperimentArgs) -> Result<(), ExperimentError> {
     let (experiments, plan) = (args.experiments(), args.plan());
     let work = experiments.iter().map(|experiment| experiment.work(&plan)).sum();
-    println!("{}; seed {}", Machine::this(), plan.seed);
     let bar = progress_bar(work);
     let reports = experiment::run(&experiments, &plan, &args.out, &mut |experiment, done| {
         bar.set_message(experiment.name());
         bar.inc(done);
     })?;
     bar.finish_and_clear();
-    for figure in reports.iter().flat_map(|report| &report.figures) {
-        println!("{}: {}", figure.title, figure.finding);
-    }
-    println!("see {}", args.out.join(PAGE).display());
+    // A closed pipe is no concern of somebody who has the folder.
+    let _printed = print(&reports, args, plan.seed);
     Ok(())
+}
+
+fn print(reports: &[Report], args: &ExperimentArgs, seed: u64) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    writeln!(out, "{}; seed {seed}", Machine::this())?;
+    for figure in reports.iter().flat_map(|report| &report.figures) {
+        writeln!(out, "{}: {}", figure.title, figure.finding)?;
+    }
+    writeln!(out, "see {}", args.out.join(PAGE).display())
 }
 
 /// Progress on standard error, if somebody looks at it.

@@ -61,7 +61,7 @@ impl Plan {
             scalability: Sweep { objects: vec![100, 400, 700, 1_000], frames: 100, rounds: 5 },
             load_balance: Sweep { objects: vec![100, 500, 1_000], frames: 200, rounds: 1 },
             per_frame: Sweep { objects: vec![300], frames: 600, rounds: 5 },
-            compare: Sweep { objects: vec![100, 1_000], frames: 100, rounds: 7 },
+            compare: Sweep { objects: vec![100, 1_000], frames: 100, rounds: 5 },
             ..Self::full()
         }
     }
