@@ -57,7 +57,7 @@ fn figure(
     };
     Chart {
         name,
-        title: format!("Speed-up over the serial version, {objects} objects{rendering}"),
+        title: format!("Speed-up over serial, {objects} objects{rendering}"),
         x_label: "threads",
         y_label: "speed-up S_s = T_s / T_p",
         x_counts: true,

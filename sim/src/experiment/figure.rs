@@ -35,6 +35,7 @@ pub struct Figure {
 /// A line of a chart.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Line {
+    /// Empty for a line that needs no legend.
     pub(super) label: String,
     pub(super) points: Vec<(f64, f64)>,
     pub(super) dashed: bool,
@@ -83,6 +84,7 @@ impl Chart {
     fn draw(self, plots: Vec<Plot>, highest: f64) -> Result<Figure, ExperimentError> {
         let mut layout = Layout::auto_from_plots(&plots)
             .with_title(self.title.as_str())
+            .with_title_size(16)
             .with_x_label(self.x_label)
             .with_y_label(self.y_label)
             .with_width(720.0)
@@ -103,10 +105,12 @@ impl Chart {
 }
 
 fn plot(line: Line) -> Plot {
-    let plot = LinePlot::new()
+    let mut plot = LinePlot::new()
         .with_data(line.points)
         .with_color(COLORS[line.color % COLORS.len()])
-        .with_stroke_width(2.0)
-        .with_legend(line.label);
+        .with_stroke_width(2.0);
+    if !line.label.is_empty() {
+        plot = plot.with_legend(line.label);
+    }
     if line.dashed { plot.with_dashed().into() } else { plot.into() }
 }

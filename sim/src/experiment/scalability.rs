@@ -52,15 +52,20 @@ fn throughput(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Experim
         color,
         ..line(&named(count), outcomes, throughput(Runner::pipeline(count)))
     }));
+    let most = threads.iter().copied().max().unwrap_or(1);
+    let reached = |outcome: Option<&Outcome>| {
+        let outcome = outcome?;
+        let fps = throughput(Runner::pipeline(most))(outcome)?;
+        Some(format!("{fps:.0} frames per second with {} objects", outcome.race.scene.objects))
+    };
+    let ends = [reached(outcomes.first()), reached(outcomes.last())];
+    let ends: Vec<String> = ends.into_iter().flatten().collect();
     Chart {
         name: "fig11-throughput",
         title: "Throughput".to_owned(),
         x_label: "objects",
         y_label: "frames per second",
-        finding: format!(
-            "Each further thread should lift the curve by as much. {}",
-            marked(outcomes)
-        ),
+        finding: format!("{}: {}. {}", named(most), ends.join(", "), marked(outcomes)),
         paper: "Each additional thread increases the throughput (Fig. 11).",
         ..Chart::default()
     }
