@@ -15,6 +15,7 @@ use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::object::{Group, Object, ObjectId};
 use dualframe_sim::render::NullRenderer;
 use dualframe_sim::scene::Scene;
+use dualframe_sim::simd::Simd;
 use dualframe_sim::stages::Stages;
 use glam::{Quat, Vec3};
 use parry3d::math::Pose;
@@ -118,6 +119,7 @@ fn idle(objects: usize) -> Scene {
         time_step: 1.0 / 240.0,
         gravity: Vec3::ZERO,
         callback_budget: None,
+        simd: Simd::detect(),
     };
     Scene { objects: (0..objects).map(body).collect(), stages }
 }

@@ -19,6 +19,7 @@
 //! | §7.1.1: particles | [`scene`] |
 //! | §7.2: the pipeline and what it is compared with | [`executor`] |
 //! | — | kernels in vector instructions | [`simd`] |
+//! | §7–§8: Eqs. 2–4, Figs. 11–17, Table 1 | `experiment`, with the feature of that name |
 
 #![deny(unsafe_code)]
 
@@ -26,6 +27,8 @@ pub mod behavior;
 pub mod block;
 pub mod blocking;
 pub mod executor;
+#[cfg(feature = "experiment")]
+pub mod experiment;
 pub mod geometry;
 pub mod interaction;
 pub mod manager;

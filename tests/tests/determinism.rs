@@ -60,7 +60,7 @@ fn one_hash_for(objects: usize) {
     let mut hashes = Vec::new();
     for gravity in [false, true] {
         for seed in 1..=3 {
-            let scene = ParticleScene { objects, seed, gravity, damping: true };
+            let scene = ParticleScene { seed, gravity, ..ParticleScene::new(objects) };
             let mut all = all_settings().into_iter();
             let first = outcome(scene, all.next().expect("there are settings"));
             for settings in all {
@@ -101,7 +101,7 @@ fn three_hundred_particles() {
 
 #[test]
 fn the_same_in_pieces() {
-    let scene = ParticleScene { objects: 60, seed: 5, gravity: true, damping: true };
+    let scene = ParticleScene { seed: 5, gravity: true, ..ParticleScene::new(60) };
     let whole = outcome(scene, default()).0;
     let mut manager =
         VeManager::new(scene.build().expect("a valid scene"), default()).expect("valid settings");

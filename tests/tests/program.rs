@@ -159,6 +159,30 @@ fn pictures_are_not_there_yet() {
 }
 
 #[test]
+fn bad_experiments() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("file");
+    std::fs::write(&file, "precious").expect("it can be written");
+    let text = file.to_str().expect("a plain path");
+    refused(&["experiment", "all", "--quick", "--out", text], text);
+    let below = format!("{text}/below");
+    refused(&["experiment", "compare", "--out", &below], &below);
+    assert_eq!(std::fs::read_to_string(&file).ok().as_deref(), Some("precious"));
+    // Nobody can make a folder or a file there.
+    refused(&["experiment", "compare", "--out", "/proc/experiments"], "/proc/experiments");
+    refused(&["experiment", "compare", "--out", "/proc"], "/proc");
+
+    let out = folder.path().join("out");
+    let out = out.to_str().expect("a plain path");
+    refused(&["experiment", "nonsense", "--out", out], "nonsense");
+    refused(&["experiment", "all", "--nonsense", "--out", out], "--nonsense");
+    refused(&["experiment", "all", "more", "--out", out], "more");
+    refused(&["experiment", "all"], "--out");
+    refused(&["experiment", "--out", out], "scalability|load-balance");
+    assert!(!Path::new(out).exists());
+}
+
+#[test]
 fn help_states_the_limits() {
     let output = run(&["--help"]);
     let help = String::from_utf8_lossy(&output.stdout);

@@ -6,6 +6,8 @@ use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dualframe_sim::blocking::{Blocking, Grain};
 use dualframe_sim::executor::{Entry, ExecutorKind, MAX_THREADS};
+use dualframe_sim::experiment::Experiment;
+use dualframe_sim::experiment::plan::Plan;
 use dualframe_sim::pool::cores;
 use dualframe_sim::scene::ParticleScene;
 use dualframe_sim::simd::{Instructions, Simd};
@@ -29,6 +31,52 @@ struct Cli {
 enum Command {
     /// Deformable particles in a room of six walls (the default).
     Particles(Particles),
+    /// The paper's experiments on this machine: tables (CSV), figures (SVG, PNG) and a page.
+    Experiment(ExperimentArgs),
+}
+
+/// Arguments of the experiments.
+#[derive(Args)]
+pub(super) struct ExperimentArgs {
+    /// Which experiment.
+    #[arg(value_enum)]
+    which: ExperimentName,
+    /// Smaller sizes: about two minutes for all on two cores.
+    #[arg(long)]
+    quick: bool,
+    /// The folder to write into, which is made if it is not there.
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: PathBuf,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ExperimentName {
+    /// Figs. 11 to 13: throughput, speed-up and efficiency.
+    Scalability,
+    /// Fig. 14 and Table 1: seconds of each worker in each stage.
+    LoadBalance,
+    /// Fig. 15: collisions and speed-up of each frame.
+    PerFrame,
+    /// Figs. 16 and 17: the pipeline against every other executor.
+    Compare,
+    /// All of them.
+    All,
+}
+
+impl ExperimentArgs {
+    pub(super) fn experiments(&self) -> Vec<Experiment> {
+        match self.which {
+            ExperimentName::Scalability => vec![Experiment::Scalability],
+            ExperimentName::LoadBalance => vec![Experiment::LoadBalance],
+            ExperimentName::PerFrame => vec![Experiment::PerFrame],
+            ExperimentName::Compare => vec![Experiment::Compare],
+            ExperimentName::All => Experiment::ALL.to_vec(),
+        }
+    }
+
+    pub(super) fn plan(&self) -> Plan {
+        if self.quick { Plan::quick() } else { Plan::full() }
+    }
 }
 
 /// Arguments of the particle environment.
@@ -170,6 +218,7 @@ fn parse_simd(text: &str) -> Result<Simd, String> {
 /// What the arguments ask for.
 pub(super) enum Outcome {
     Run(Particles),
+    Experiment(ExperimentArgs),
     /// Help or version, already printed.
     Told,
     /// One line that says what is wrong.
@@ -183,6 +232,7 @@ pub(super) fn parse() -> Outcome {
     };
     let particles = match cli.command {
         Some(Command::Particles(particles)) => particles,
+        Some(Command::Experiment(experiment)) => return Outcome::Experiment(experiment),
         None => cli.particles,
     };
     particles.check().map_or_else(Outcome::Bad, Outcome::Run)
@@ -194,8 +244,14 @@ fn refuse(error: &clap::Error) -> Outcome {
         let _printed = error.print();
         return Outcome::Told;
     }
-    // The first line says what is wrong; the rest is usage.
+    // The first line says what is wrong, or ends in a colon and the next ones say it; then comes usage.
     let text = error.to_string();
-    let line = text.lines().next().unwrap_or("bad arguments");
-    Outcome::Bad(line.strip_prefix("error: ").unwrap_or(line).to_owned())
+    let mut lines = text.lines();
+    let mut line = lines.next().unwrap_or("bad arguments").to_owned();
+    if line.ends_with(':') {
+        for item in lines.map(str::trim).take_while(|item| !item.is_empty()) {
+            line = line + " " + item;
+        }
+    }
+    Outcome::Bad(line.strip_prefix("error: ").unwrap_or(&line).to_owned())
 }

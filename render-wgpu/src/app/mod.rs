@@ -1,6 +1,7 @@
 //! The program: arguments in, a run, a report out.
 
 mod args;
+mod experiment;
 mod measure;
 mod particles;
 mod report;
@@ -8,7 +9,7 @@ mod report;
 use std::error::Error;
 use std::process::ExitCode;
 
-use self::args::Outcome;
+use self::args::{ExperimentArgs, Outcome, Particles};
 
 /// Counts the heap allocations made so far.
 pub(crate) type AllocationCounter<'a> = &'a dyn Fn() -> usize;
@@ -20,17 +21,31 @@ const BAD_ARGUMENT: u8 = 2;
 
 /// Runs the program; see the README for its exit statuses.
 pub(crate) fn main(allocations: AllocationCounter<'_>) -> ExitCode {
-    let particles = match args::parse() {
-        Outcome::Run(particles) => particles,
-        Outcome::Told => return ExitCode::SUCCESS,
-        Outcome::Bad(line) => return fail(&line, BAD_ARGUMENT),
-    };
+    match args::parse() {
+        Outcome::Run(particles) => run_particles(&particles, allocations),
+        Outcome::Experiment(args) => run_experiments(&args),
+        Outcome::Told => ExitCode::SUCCESS,
+        Outcome::Bad(line) => fail(&line, BAD_ARGUMENT),
+    }
+}
+
+fn run_experiments(args: &ExperimentArgs) -> ExitCode {
+    if let Err(line) = experiment::prepare(&args.out) {
+        return fail(&line, BAD_ARGUMENT);
+    }
+    match experiment::run(args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => fail(&with_causes(&error), UNSOUND),
+    }
+}
+
+fn run_particles(particles: &Particles, allocations: AllocationCounter<'_>) -> ExitCode {
     // Opened before any work is done: an hour's run must not end in "no such folder".
     let json = match particles.json.as_deref().map(report::open).transpose() {
         Ok(json) => json,
         Err(line) => return fail(&line, BAD_ARGUMENT),
     };
-    let report = match particles::run(&particles, allocations) {
+    let report = match particles::run(particles, allocations) {
         Ok(report) => report,
         Err(error) => return fail(&with_causes(&error), UNSOUND),
     };

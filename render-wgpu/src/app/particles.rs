@@ -28,10 +28,9 @@ pub(super) enum RunError {
 /// Runs the environment as `args` say.
 pub(super) fn run(args: &Particles, count: AllocationCounter<'_>) -> Result<Report, RunError> {
     let scene = ParticleScene {
-        objects: args.objects,
         seed: args.seed,
         gravity: args.gravity,
-        damping: true,
+        ..ParticleScene::new(args.objects)
     };
     let build = || {
         let mut scene = scene.build()?;

@@ -61,9 +61,6 @@ const VOLUME_PER_PARTICLE: f64 = 0.046;
 const SPACING: f32 = 0.24;
 /// The greatest component of a particle's velocity at the start, in metres per second; usually 1.
 const SPEED: f32 = 1.0;
-/// The most substeps a frame, 10 (§7.1.1).
-const MOST_SUBSTEPS: u32 = 10;
-
 /// The group of particles.
 const PARTICLES: Group = Group(0);
 /// The group of walls.
@@ -97,7 +94,7 @@ pub enum SceneError {
 
 /// The particle environment: once-subdivided icosahedra of 42 nodes and 162 springs in a room of six
 /// walls whose volume grows with their number. They start close together, around the room's middle,
-/// at random velocities; each integrates 1 to 10 substeps a frame.
+/// at random velocities; each integrates 1 to 10 substeps a frame, unless asked otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ParticleScene {
     /// The number of particles, 1 to [`ParticleScene::MAX_OBJECTS`]. The six walls come on top.
@@ -109,6 +106,9 @@ pub struct ParticleScene {
     /// Whether springs, contacts and walls are damped and walls have friction. Without, energy is
     /// kept, up to the integrator's oscillation around it.
     pub damping: bool,
+    /// The most substeps a frame, at least 1; usually 10 (§7.1.1). Each particle's are drawn from 1 to
+    /// this.
+    pub most_substeps: u32,
 }
 
 impl ParticleScene {
@@ -118,16 +118,19 @@ impl ParticleScene {
     /// So many particles without gravity, damped, from seed 1.
     #[must_use]
     pub fn new(objects: usize) -> Self {
-        Self { objects, seed: 1, gravity: false, damping: true }
+        Self { objects, seed: 1, gravity: false, damping: true, most_substeps: 10 }
     }
 
     /// Builds the objects and the rules.
     ///
     /// # Errors
-    /// No particle, or more than [`ParticleScene::MAX_OBJECTS`].
+    /// No particle, or more than [`ParticleScene::MAX_OBJECTS`]; no substeps.
     pub fn build(&self) -> Result<Scene, SceneError> {
         if !(1..=Self::MAX_OBJECTS).contains(&self.objects) {
             return Err(SceneError::Objects { objects: self.objects });
+        }
+        if self.most_substeps == 0 {
+            return Err(MassSpringError::NoSubsteps.into());
         }
         let centers = lattice(self.objects);
         let mut objects = self.particles(&centers)?;
@@ -162,12 +165,12 @@ impl ParticleScene {
             let mut mesh = Mesh::new(Arc::clone(&topology), &positions, &masses, CONTACT_RADIUS)?;
             let mut component = || random.symmetric();
             mesh.set_velocity(Vec3::new(component(), component(), component()) * SPEED);
-            let substeps = random.up_to(MOST_SUBSTEPS);
+            let substeps = random.up_to(self.most_substeps);
             let behavior = MassSpring::new(STIFFNESS, self.damped(DAMPING), substeps)?
                 .with_center_stiffness(CENTER_STIFFNESS)?;
             let id = ObjectId(index as u32);
             let mut object = Object::new(id, PARTICLES, Geometry::Mesh(mesh), behavior);
-            object.visual = VisualProperties { color: color(substeps) };
+            object.visual = VisualProperties { color: color(substeps, self.most_substeps) };
             objects.push(object);
         }
         Ok(objects)
@@ -192,9 +195,9 @@ impl ParticleScene {
     }
 }
 
-/// From blue for one substep to orange for ten.
-fn color(substeps: u32) -> [f32; 4] {
-    let share = (substeps - 1) as f32 / (MOST_SUBSTEPS - 1) as f32;
+/// From blue for one substep to orange for the most.
+fn color(substeps: u32, most: u32) -> [f32; 4] {
+    let share = (substeps - 1) as f32 / (most - 1).max(1) as f32;
     [0.1 + 0.8 * share, 0.3 + 0.1 * share, 0.8 - 0.7 * share, 1.0]
 }
 

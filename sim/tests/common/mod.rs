@@ -29,7 +29,7 @@ use glam::Vec3;
 
 /// A particle scene, or the test ends.
 pub(crate) fn particles(objects: usize, gravity: bool, damping: bool) -> Scene {
-    let scene = ParticleScene { objects, seed: 1, gravity, damping };
+    let scene = ParticleScene { gravity, damping, ..ParticleScene::new(objects) };
     scene.build().expect("the number of particles is allowed")
 }
 

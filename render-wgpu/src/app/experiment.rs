@@ -1,0 +1,55 @@
+//! `dualframe experiment`.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::Path;
+
+use dualframe_sim::experiment::error::ExperimentError;
+use dualframe_sim::experiment::machine::Machine;
+use dualframe_sim::experiment::{self, PAGE, Report};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::args::ExperimentArgs;
+use super::report;
+
+/// Makes the folder and sees that it can be written to: an hour's run must not end in "no such
+/// folder".
+pub(super) fn prepare(out: &Path) -> Result<(), String> {
+    let made = fs::create_dir_all(out);
+    made.map_err(|error| format!("cannot make the folder {}: {error}", out.display()))?;
+    report::open(&out.join(PAGE)).map(drop)
+}
+
+/// Runs the experiments that `args` ask for.
+pub(super) fn run(args: &ExperimentArgs) -> Result<(), ExperimentError> {
+    let (experiments, plan) = (args.experiments(), args.plan());
+    let work = experiments.iter().map(|experiment| experiment.work(&plan)).sum();
+    let bar = progress_bar(work);
+    let reports = experiment::run(&experiments, &plan, &args.out, &mut |experiment, done| {
+        bar.set_message(experiment.name());
+        bar.inc(done);
+    })?;
+    bar.finish_and_clear();
+    // A closed pipe is no concern of somebody who has the folder.
+    let _printed = print(&reports, args, plan.seed);
+    Ok(())
+}
+
+fn print(reports: &[Report], args: &ExperimentArgs, seed: u64) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    writeln!(out, "{}; seed {seed}", Machine::this())?;
+    for figure in reports.iter().flat_map(|report| &report.figures) {
+        writeln!(out, "{}: {}", figure.title, figure.finding)?;
+    }
+    writeln!(out, "see {}", args.out.join(PAGE).display())
+}
+
+/// Progress on standard error, if somebody looks at it.
+fn progress_bar(work: u64) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:40} {percent} % {msg}, {eta} left");
+    let bar = ProgressBar::new(work);
+    match style {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}

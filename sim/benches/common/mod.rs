@@ -1,0 +1,103 @@
+//! What the benches that time whole frames share: arguments and tables.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::Parser;
+use dualframe_sim::experiment::error::ExperimentError;
+use dualframe_sim::experiment::machine::Machine;
+use dualframe_sim::experiment::statistics::Quartiles;
+use dualframe_sim::experiment::timing::{Rounds, Series};
+
+/// The arguments of a bench.
+#[derive(Parser)]
+pub(crate) struct Arguments {
+    /// Rounds of each race.
+    #[arg(long, value_name = "N", default_value_t = 15)]
+    pub(crate) rounds: usize,
+    /// Frames of each run; by default about as many as take 50 ms on one thread.
+    #[arg(long, value_name = "N")]
+    pub(crate) frames: Option<u64>,
+    /// Numbers of particles.
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
+    pub(crate) objects: Vec<usize>,
+    /// Threads of the parallel executors.
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub(crate) threads: usize,
+    /// See only whether it runs.
+    #[arg(long)]
+    pub(crate) test: bool,
+    /// What cargo adds.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+impl Arguments {
+    /// Numbers of particles: those asked for, or else `usual`.
+    pub(crate) fn objects_or(&self, usual: &[usize]) -> Vec<usize> {
+        if self.test {
+            vec![8]
+        } else if self.objects.is_empty() {
+            usual.to_vec()
+        } else {
+            self.objects.clone()
+        }
+    }
+
+    /// Frames of a run: those asked for, or else about as many as update `updates` particles.
+    pub(crate) fn frames_for(&self, objects: usize, updates: usize) -> u64 {
+        let usual = (updates / objects).max(20) as u64;
+        if self.test { 3 } else { self.frames.unwrap_or(usual) }
+    }
+}
+
+/// Runs a bench: reads its arguments, says what it runs on, and reports its failure.
+pub(crate) fn main(bench: fn(&Arguments) -> Result<(), ExperimentError>) -> ExitCode {
+    let mut arguments = Arguments::parse();
+    if arguments.test {
+        arguments.rounds = 1;
+    }
+    let name = std::env::args().next().unwrap_or_default();
+    let name = Path::new(&name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    println!("{name}: {}; {} rounds", Machine::this(), arguments.rounds);
+    match bench(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{name}: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Prints what was run, what the calibrator saw, and for each contender the time of a frame and how
+/// many times the first contender's it is, over all rounds and over the good ones. A run has so many
+/// frames.
+pub(crate) fn print(title: &str, series: &Series, frames: f64) {
+    println!("\n{title}");
+    let phases = series.rounds().iter().map(|round| round.phase);
+    let gain = Quartiles::of(phases.clone().map(|phase| phase.gain));
+    let ping_pong = Quartiles::of(phases.map(|phase| phase.ping_pong));
+    println!(
+        "calibrator: gain {}, ping-pong {} ns, {} of {} rounds marked",
+        range(gain, 3),
+        range(ping_pong, 0),
+        series.marked(),
+        series.rounds().len(),
+    );
+    println!(
+        "{:24}{:>28}{:>26}{:>26}",
+        "", "µs a frame, all rounds", "times the first, all", "times the first, good"
+    );
+    for (index, label) in series.labels().iter().enumerate() {
+        let time = series.quartiles(Rounds::All, |seconds| seconds[index] * 1e6 / frames);
+        let [all, good] = [Rounds::All, Rounds::Good].map(|which| series.ratio(which, index, 0));
+        println!("{label:24}{:>28}{:>26}{:>26}", range(time, 1), range(all, 3), range(good, 3));
+    }
+}
+
+/// Quartiles as "median [lower upper]".
+pub(crate) fn range(quartiles: Option<Quartiles>, digits: usize) -> String {
+    quartiles.map_or("none".to_owned(), |Quartiles { lower, median, upper }| {
+        format!("{median:.digits$} [{lower:.digits$} {upper:.digits$}]")
+    })
+}

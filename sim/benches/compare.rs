@@ -1,0 +1,60 @@
+//! The pipeline against every other executor, without and with rendering.
+#![forbid(unsafe_code)]
+
+mod common;
+
+use std::process::ExitCode;
+
+use dualframe_sim::experiment::calibrator::Calibrator;
+use dualframe_sim::experiment::error::ExperimentError;
+use dualframe_sim::experiment::load::{RenderLoad, StandIn};
+use dualframe_sim::experiment::race::{Race, Runner, WARM_UP};
+use dualframe_sim::experiment::speedup::efficiency;
+use dualframe_sim::scene::ParticleScene;
+
+fn main() -> ExitCode {
+    common::main(compare)
+}
+
+fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
+    let calibrator = Calibrator::default();
+    let hundreds: Vec<usize> = (100..=1_000).step_by(100).collect();
+    let (one, pipeline) = (Runner::pipeline(1), Runner::pipeline(arguments.threads));
+    let mut runners: Vec<Runner> = Runner::parallel(arguments.threads).collect();
+    let others: Vec<Runner> =
+        runners.iter().copied().filter(|&runner| runner != pipeline).collect();
+    runners.push(Runner::SERIAL);
+    if one != pipeline {
+        runners.push(one);
+    }
+    let mut lines = Vec::new();
+    for objects in arguments.objects_or(&hundreds) {
+        let scene = ParticleScene::new(objects);
+        for load in [RenderLoad::Null, RenderLoad::StandIn(StandIn::calibrated(scene)?)] {
+            let frames = arguments.frames_for(objects, 20_000);
+            let race = Race { scene, load, warm_up: WARM_UP, frames, rounds: arguments.rounds };
+            let outcome = race.run(&runners, &mut || calibrator.phase(), &mut || ())?;
+            common::print(&race.to_string(), &outcome.series, race.frames as f64);
+            let over = |other| outcome.median_speed_up(pipeline, other).unwrap_or(f64::NAN);
+            let (s_s, s_p) = (over(Runner::SERIAL), over(one));
+            // The lowest of the medians: a minimum within each round would favour whichever
+            // executor happened to be undisturbed.
+            let fastest = others.iter().map(|&other| over(other)).fold(f64::INFINITY, f64::min);
+            let mut line = format!(
+                "{objects:7}  {:8}  {s_s:5.3}  {:5.3}  {fastest:7.3}",
+                load.name(),
+                efficiency(s_p, arguments.threads)
+            );
+            for &other in &others {
+                line += &format!("  {:>16.3}", over(other));
+            }
+            lines.push(line);
+        }
+    }
+    let names: String =
+        others.iter().map(|other| format!("  {:>16}", other.executor.name())).collect();
+    println!("\n{}: medians over good rounds (all if none is good)", pipeline.label());
+    println!("objects  render      S_s    E_p  fastest{names}");
+    lines.iter().for_each(|line| println!("{line}"));
+    Ok(())
+}

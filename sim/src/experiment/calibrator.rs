@@ -1,0 +1,156 @@
+//! What the machine gives at the moment, measured beside each round.
+//!
+//! Other programs on a shared machine take time from some rounds and not from others. Two threads that
+//! share nothing show lost cores; a ping-pong between two threads shows slow communication, which the
+//! first do not notice.
+
+use std::sync::Barrier;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use super::statistics::Quartiles;
+use super::work::{seconds_of, steps_per_second};
+
+/// Seconds of one repetition of the busy threads; usually 0.002, long against the time it takes to
+/// start them together and short against a round.
+const BUSY: f64 = 0.002;
+/// Repetitions, alone and together.
+const REPETITIONS: usize = 5;
+/// Round trips whose mean is one value of the ping-pong; the median of such values counts.
+const TRIPS: u32 = 50;
+/// Values of the ping-pong, if time allows.
+const BATCHES: usize = 20;
+/// The longest that the ping-pong may take: on a single core each trip is a switch of threads.
+const PATIENCE: Duration = Duration::from_millis(20);
+/// Tells the partner of a ping-pong to stop.
+const STOP: u32 = u32::MAX;
+
+/// What two threads can do at the moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Phase {
+    /// How much more two independent busy threads get done than one; ideally 2.
+    pub gain: f64,
+    /// Nanoseconds for a word to go from one thread to another.
+    pub ping_pong: f64,
+}
+
+impl Phase {
+    /// The gain below which a round is marked.
+    pub const LEAST_GAIN: f64 = 1.9;
+    /// How many times the best ping-pong seen a round's may be.
+    pub const WORST_PING_PONG: f64 = 3.0;
+
+    /// The worse of two, in both respects.
+    #[must_use]
+    pub fn worse(self, other: Self) -> Self {
+        Self { gain: self.gain.min(other.gain), ping_pong: self.ping_pong.max(other.ping_pong) }
+    }
+
+    /// Whether a round in this phase is to be marked, if the best ping-pong took `best` nanoseconds.
+    #[must_use]
+    pub fn is_bad(self, best: f64) -> bool {
+        self.gain < Self::LEAST_GAIN || self.ping_pong > Self::WORST_PING_PONG * best
+    }
+}
+
+/// Measures phases.
+#[derive(Clone, Copy, Debug)]
+pub struct Calibrator {
+    steps: u64,
+}
+
+impl Default for Calibrator {
+    /// A calibrator for this machine.
+    fn default() -> Self {
+        Self { steps: (steps_per_second() * BUSY) as u64 }
+    }
+}
+
+impl Calibrator {
+    /// Measures the present phase, in about 30 ms.
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        Phase { gain: self.gain(), ping_pong: ping_pong() * 1e9 }
+    }
+
+    fn gain(&self) -> f64 {
+        // The fastest: what one thread does when nothing disturbs it.
+        let alone = (0..REPETITIONS).map(|_| seconds_of(self.steps)).fold(f64::INFINITY, f64::min);
+        let start = Barrier::new(2);
+        let repeat = || -> Vec<f64> {
+            let once = || {
+                start.wait();
+                seconds_of(self.steps)
+            };
+            (0..REPETITIONS).map(|_| once()).collect()
+        };
+        let (own, other) = thread::scope(|scope| {
+            let other = scope.spawn(repeat);
+            (repeat(), other.join())
+        });
+        let Ok(other) = other else { return 0.0 };
+        // The mean, so that one repetition without a core shows.
+        let slowest: f64 = own.iter().zip(&other).map(|(own, other)| own.max(*other)).sum();
+        2.0 * alone * REPETITIONS as f64 / slowest
+    }
+}
+
+/// Seconds for a word to go from one thread to another.
+fn ping_pong() -> f64 {
+    let ball = AtomicU32::new(0);
+    thread::scope(|scope| {
+        scope.spawn(|| answer(&ball));
+        let began = Instant::now();
+        let mut batches = Vec::with_capacity(BATCHES);
+        let mut turn = 0;
+        while batches.len() < BATCHES && (batches.is_empty() || began.elapsed() < PATIENCE) {
+            let began = Instant::now();
+            for _ in 0..TRIPS {
+                // Relaxed: nothing but the ball itself is handed over.
+                ball.store(turn + 1, Ordering::Relaxed);
+                turn += 2;
+                while ball.load(Ordering::Relaxed) != turn {
+                    std::hint::spin_loop();
+                }
+            }
+            batches.push(began.elapsed().as_secs_f64() / f64::from(2 * TRIPS));
+        }
+        ball.store(STOP, Ordering::Relaxed);
+        Quartiles::of(batches).map_or(f64::INFINITY, |times| times.median)
+    })
+}
+
+/// Returns every odd ball as the next even one.
+fn answer(ball: &AtomicU32) {
+    loop {
+        // Relaxed: as above.
+        match ball.load(Ordering::Relaxed) {
+            STOP => return,
+            odd if odd % 2 == 1 => ball.store(odd + 1, Ordering::Relaxed),
+            _ => std::hint::spin_loop(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_phase_is_measured() {
+        let phase = Calibrator::default().phase();
+        assert!(phase.gain > 0.0 && phase.gain.is_finite(), "{phase:?}");
+        assert!(phase.ping_pong > 0.0 && phase.ping_pong.is_finite(), "{phase:?}");
+    }
+
+    #[test]
+    fn bad_phases() {
+        let good = Phase { gain: 1.95, ping_pong: 100.0 };
+        assert!(!good.is_bad(100.0));
+        assert!(Phase { gain: 1.89, ..good }.is_bad(100.0));
+        assert!(Phase { ping_pong: 301.0, ..good }.is_bad(100.0));
+        let worse = good.worse(Phase { gain: 1.5, ping_pong: 50.0 });
+        assert_eq!(worse, Phase { gain: 1.5, ping_pong: 100.0 });
+    }
+}

@@ -1,0 +1,116 @@
+//! Figures, drawn by kuva.
+
+use kuva::backend::raster::RasterBackend;
+use kuva::backend::svg::SvgBackend;
+use kuva::plot::{BarPlot, LegendPosition, LinePlot};
+use kuva::render::layout::Layout;
+use kuva::render::plots::Plot;
+use kuva::render::render::render_multiple;
+
+use super::error::ExperimentError;
+
+/// Pixels of a PNG for one of the SVG's.
+const SCALE: f32 = 2.0;
+/// Colours that are told apart by most people (Okabe and Ito 2008), but yellow, which is pale.
+const COLORS: [&str; 7] =
+    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000"];
+
+/// A drawn figure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    /// Its files' name, without ending.
+    pub name: &'static str,
+    /// What it shows.
+    pub title: String,
+    /// The drawing.
+    pub svg: String,
+    /// The same in pixels.
+    pub png: Vec<u8>,
+    /// What was found, in a sentence or two.
+    pub finding: String,
+    /// What the paper says of it, on its machine of six cores.
+    pub paper: &'static str,
+}
+
+/// A line of a chart.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Line {
+    /// Empty for a line that needs no legend.
+    pub(super) label: String,
+    pub(super) points: Vec<(f64, f64)>,
+    pub(super) dashed: bool,
+    /// Lines of the same number have the same colour.
+    pub(super) color: usize,
+}
+
+/// What to draw.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Chart {
+    pub(super) name: &'static str,
+    pub(super) title: String,
+    pub(super) x_label: &'static str,
+    pub(super) y_label: &'static str,
+    /// Whether the x axis counts something small, one tick for each.
+    pub(super) x_counts: bool,
+    pub(super) finding: String,
+    pub(super) paper: &'static str,
+}
+
+impl Chart {
+    /// Draws lines; the y axis begins at 0.
+    pub(super) fn lines(self, lines: Vec<Line>) -> Result<Figure, ExperimentError> {
+        let highest = lines.iter().flat_map(|line| &line.points).map(|&(_, y)| y);
+        let highest = highest.fold(0.0, f64::max);
+        let plots = lines.into_iter().map(plot).collect();
+        self.draw(plots, highest)
+    }
+
+    /// Draws a group of bars for each label; `series` names the bars of a group.
+    pub(super) fn bars(
+        self,
+        series: &[String],
+        groups: Vec<(String, Vec<f64>)>,
+    ) -> Result<Figure, ExperimentError> {
+        let highest = groups.iter().flat_map(|(_, bars)| bars).copied().fold(0.0, f64::max);
+        let mut plot = BarPlot::new();
+        for (label, bars) in groups {
+            let colors = COLORS.into_iter().cycle();
+            plot = plot.with_group(label, bars.into_iter().zip(colors));
+        }
+        let plot = plot.with_legend(series.iter().map(String::as_str).collect());
+        self.draw(vec![plot.into()], highest)
+    }
+
+    fn draw(self, plots: Vec<Plot>, highest: f64) -> Result<Figure, ExperimentError> {
+        let mut layout = Layout::auto_from_plots(&plots)
+            .with_title(self.title.as_str())
+            .with_title_size(16)
+            .with_x_label(self.x_label)
+            .with_y_label(self.y_label)
+            .with_width(720.0)
+            .with_height(420.0)
+            .with_y_axis_min(0.0)
+            .with_y_axis_max(if highest > 0.0 { highest * 1.05 } else { 1.0 })
+            .with_legend_position(LegendPosition::OutsideRightTop);
+        if self.x_counts {
+            layout = layout.with_x_tick_step(1.0);
+        }
+        let scene = render_multiple(plots, layout);
+        let png = RasterBackend::new().with_scale(SCALE).render_scene(&scene);
+        let png = png.map_err(|reason| ExperimentError::Draw { figure: self.name, reason })?;
+        let svg = SvgBackend.render_scene(&scene);
+        let Self { name, title, finding, paper, .. } = self;
+        Ok(Figure { name, title, svg, png, finding, paper })
+    }
+}
+
+fn plot(line: Line) -> Plot {
+    let mut plot = LinePlot::new()
+        .with_data(line.points)
+        .with_color(COLORS[line.color % COLORS.len()])
+        .with_stroke_width(2.0);
+    if !line.label.is_empty() {
+        plot = plot.with_legend(line.label);
+    }
+    if line.dashed { plot.with_dashed().into() } else { plot.into() }
+}

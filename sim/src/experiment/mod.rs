@@ -1,0 +1,180 @@
+//! The paper's experiments (§7–§8): Eqs. 2–4, Figs. 11–17 and Table 1 on this machine.
+//!
+//! Whatever is compared runs interleaved in one process, in rounds whose order rotates, with a
+//! [`calibrator`] beside each round. Rounds in a bad phase of the machine are marked and counted, never
+//! dropped: results are given over all rounds and over the good ones. The runs of a race must end in
+//! the same state, bit for bit.
+//!
+//! | paper | module |
+//! |---|---|
+//! | §7.2, Eqs. 2–4 | [`speedup`] |
+//! | §7.2.1, Figs. 11–13 | [`Experiment::Scalability`] |
+//! | §7.2.2, Fig. 14, Table 1 | [`Experiment::LoadBalance`] |
+//! | §7.2.2, Fig. 15 | [`Experiment::PerFrame`] |
+//! | §7.2.3, Figs. 16 and 17 | [`Experiment::Compare`] |
+
+pub mod calibrator;
+mod compare;
+pub mod error;
+pub mod figure;
+pub mod load;
+mod load_balance;
+pub mod machine;
+pub mod outcome;
+mod page;
+mod per_frame;
+pub mod plan;
+pub mod race;
+mod scalability;
+pub mod speedup;
+pub mod statistics;
+pub mod table;
+pub mod timing;
+mod work;
+
+use std::path::{Path, PathBuf};
+
+use self::calibrator::Calibrator;
+use self::error::ExperimentError;
+use self::figure::Figure;
+use self::machine::Machine;
+use self::outcome::Outcome;
+use self::plan::Plan;
+use self::race::{OnFrame, Race, Runner, WARM_UP};
+use self::table::Table;
+
+/// The name of the page.
+pub const PAGE: &str = "index.html";
+
+/// The paper's experiments.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Experiment {
+    /// Throughput, speed-up and efficiency by numbers of objects and threads.
+    Scalability,
+    /// How long each worker works in each stage.
+    LoadBalance,
+    /// Collisions and speed-up of each frame.
+    PerFrame,
+    /// The pipeline against every other executor.
+    Compare,
+}
+
+impl Experiment {
+    /// All of them, in the paper's order.
+    pub const ALL: [Self; 4] =
+        [Self::Scalability, Self::LoadBalance, Self::PerFrame, Self::Compare];
+
+    /// The name by which the program knows it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scalability => "scalability",
+            Self::LoadBalance => "load-balance",
+            Self::PerFrame => "per-frame",
+            Self::Compare => "compare",
+        }
+    }
+
+    /// How much work it is, in objects updated.
+    #[must_use]
+    pub fn work(self, plan: &Plan) -> u64 {
+        let threads = plan.threads.len();
+        match self {
+            Self::Scalability => plan.scalability.work(1 + threads, WARM_UP),
+            Self::LoadBalance => plan.load_balance.work(1, 0),
+            Self::PerFrame => plan.per_frame.work(threads, 0),
+            Self::Compare => {
+                let runners = 1 + threads * Runner::parallel(1).count();
+                // Without and with rendering.
+                2 * plan.compare.work(runners, WARM_UP)
+            }
+        }
+    }
+
+    fn run(self, laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentError> {
+        match self {
+            Self::Scalability => scalability::run(laboratory),
+            Self::LoadBalance => load_balance::run(laboratory),
+            Self::PerFrame => per_frame::run(laboratory),
+            Self::Compare => compare::run(laboratory),
+        }
+    }
+}
+
+/// What an experiment found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// What was measured.
+    pub tables: Vec<Table>,
+    /// What it looks like.
+    pub figures: Vec<Figure>,
+    /// A table that the page shows, if there is one.
+    pub shown: Option<Table>,
+}
+
+/// Runs experiments one after the other and writes into the folder `out`, which must be there: of each
+/// experiment, as soon as it has ended, its tables (CSV) and figures (SVG, PNG), and the page
+/// [`PAGE`] of all that have ended. `progress` is told what is running and how much work was done
+/// since it was told last, in the unit of [`Experiment::work`].
+///
+/// # Errors
+/// An experiment cannot be run, its runs were not sound, or a file cannot be written.
+pub fn run(
+    experiments: &[Experiment],
+    plan: &Plan,
+    out: &Path,
+    progress: &mut dyn FnMut(Experiment, u64),
+) -> Result<Vec<Report>, ExperimentError> {
+    let machine = Machine::this();
+    let calibrator = Calibrator::default();
+    let mut reports = Vec::new();
+    for &experiment in experiments {
+        let mut progress = |work| progress(experiment, work);
+        let mut laboratory = Laboratory { plan, calibrator, progress: &mut progress };
+        let report = experiment.run(&mut laboratory)?;
+        for table in &report.tables {
+            write(out.join(table.name).with_extension("csv"), table.csv().as_bytes())?;
+        }
+        for figure in &report.figures {
+            write(out.join(figure.name).with_extension("svg"), figure.svg.as_bytes())?;
+            write(out.join(figure.name).with_extension("png"), &figure.png)?;
+        }
+        reports.push(report);
+        write(out.join(PAGE), page::page(&machine, plan, &reports).as_bytes())?;
+    }
+    Ok(reports)
+}
+
+fn write(path: PathBuf, bytes: &[u8]) -> Result<(), ExperimentError> {
+    std::fs::write(&path, bytes).map_err(|source| ExperimentError::Write { path, source })
+}
+
+/// What experiments are run with.
+struct Laboratory<'a> {
+    plan: &'a Plan,
+    calibrator: Calibrator,
+    progress: &'a mut dyn FnMut(u64),
+}
+
+impl Laboratory<'_> {
+    fn race(&mut self, race: Race, runners: &[Runner]) -> Result<Outcome, ExperimentError> {
+        self.race_observed(race, runners, &mut |_, _, _| ())
+    }
+
+    fn race_observed(
+        &mut self,
+        race: Race,
+        runners: &[Runner],
+        on_frame: &mut OnFrame<'_>,
+    ) -> Result<Outcome, ExperimentError> {
+        let work = race.scene.objects as u64 * (race.warm_up + race.frames);
+        let calibrator = self.calibrator;
+        let mut phase = || calibrator.phase();
+        let mut done = || self.advance(work);
+        race.observed(runners, &mut phase, &mut done, on_frame)
+    }
+
+    fn advance(&mut self, work: u64) {
+        (self.progress)(work);
+    }
+}

@@ -1,0 +1,172 @@
+//! What a race came to, and the rows it makes in the tables.
+
+use super::race::{Race, Runner};
+use super::speedup::efficiency;
+use super::statistics::Quartiles;
+use super::table::Table;
+use super::timing::{Rounds, Series};
+
+/// The columns of [`Outcome::add_rounds`].
+const ROUND_COLUMNS: [&str; 10] = [
+    "objects",
+    "load",
+    "executor",
+    "threads",
+    "round",
+    "seconds",
+    "frames_per_second",
+    "gain",
+    "ping_pong_ns",
+    "marked",
+];
+
+/// The columns of [`Outcome::add_summary`].
+const SUMMARY_COLUMNS: [&str; 17] = [
+    "objects",
+    "load",
+    "executor",
+    "threads",
+    "which_rounds",
+    "rounds",
+    "seconds_lower",
+    "seconds_median",
+    "seconds_upper",
+    "frames_per_second",
+    "s_s_lower",
+    "s_s_median",
+    "s_s_upper",
+    "s_p_lower",
+    "s_p_median",
+    "s_p_upper",
+    "e_p",
+];
+
+/// A race that was run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// What was run.
+    pub race: Race,
+    /// Who took part.
+    pub runners: Vec<Runner>,
+    /// The times, with a contender for each runner.
+    pub series: Series,
+}
+
+impl Outcome {
+    /// A table for every round of every runner.
+    #[must_use]
+    pub fn rounds_table(name: &'static str) -> Table {
+        Table::new(name, &ROUND_COLUMNS)
+    }
+
+    /// A table for what the rounds come to.
+    #[must_use]
+    pub fn summary_table(name: &'static str) -> Table {
+        Table::new(name, &SUMMARY_COLUMNS)
+    }
+
+    /// A runner's quartiles of frames per second.
+    #[must_use]
+    pub fn throughput(&self, which: Rounds, runner: Runner) -> Option<Quartiles> {
+        let index = self.index(runner)?;
+        self.series.quartiles(which, |seconds| self.race.frames as f64 / seconds[index])
+    }
+
+    /// The quartiles of the rounds' speed-ups of a runner over another.
+    #[must_use]
+    pub fn speed_up(&self, which: Rounds, runner: Runner, over: Runner) -> Option<Quartiles> {
+        self.series.ratio(which, self.index(over)?, self.index(runner)?)
+    }
+
+    /// The runner's median speed-up over another in the good rounds, or in all if none is good.
+    #[must_use]
+    pub fn median_speed_up(&self, runner: Runner, over: Runner) -> Option<f64> {
+        Some(self.speed_up(self.series.best_rounds(), runner, over)?.median)
+    }
+
+    /// Adds a row for each runner and round.
+    pub fn add_rounds(&self, table: &mut Table) {
+        let Race { scene, load, frames, .. } = &self.race;
+        for (number, (round, bad)) in
+            self.series.rounds().iter().zip(self.series.marks()).enumerate()
+        {
+            for (runner, seconds) in self.runners.iter().zip(&round.seconds) {
+                table.push(&[
+                    &scene.objects,
+                    &load.name(),
+                    &runner.executor.name(),
+                    &runner.threads,
+                    &number,
+                    &format_args!("{seconds:.6}"),
+                    &format_args!("{:.2}", *frames as f64 / seconds),
+                    &format_args!("{:.3}", round.phase.gain),
+                    &format_args!("{:.1}", round.phase.ping_pong),
+                    &u8::from(bad),
+                ]);
+            }
+        }
+    }
+
+    /// Adds two rows for each runner: over all rounds, and over the good ones if there are any.
+    pub fn add_summary(&self, table: &mut Table) {
+        let all = self.series.rounds().len();
+        let good = all - self.series.marked();
+        for (which, name, count) in [(Rounds::All, "all", all), (Rounds::Good, "good", good)] {
+            for &runner in &self.runners {
+                self.add_summary_row(table, runner, (which, name, count));
+            }
+        }
+    }
+
+    fn add_summary_row(
+        &self,
+        table: &mut Table,
+        runner: Runner,
+        (which, name, count): (Rounds, &str, usize),
+    ) {
+        let seconds = self.index(runner).and_then(|index| self.series.seconds(which, index));
+        let Some(seconds) = seconds else { return };
+        let one = Runner { threads: 1, ..runner };
+        let (s_s, s_p) =
+            (self.speed_up(which, runner, Runner::SERIAL), self.speed_up(which, runner, one));
+        let cell =
+            |value: Option<f64>| value.map(|value| format!("{value:.4}")).unwrap_or_default();
+        table.push(&[
+            &self.race.scene.objects,
+            &self.race.load.name(),
+            &runner.executor.name(),
+            &runner.threads,
+            &name,
+            &count,
+            &format_args!("{:.6}", seconds.lower),
+            &format_args!("{:.6}", seconds.median),
+            &format_args!("{:.6}", seconds.upper),
+            &format_args!("{:.2}", self.race.frames as f64 / seconds.median),
+            &cell(s_s.map(|ratio| ratio.lower)),
+            &cell(s_s.map(|ratio| ratio.median)),
+            &cell(s_s.map(|ratio| ratio.upper)),
+            &cell(s_p.map(|ratio| ratio.lower)),
+            &cell(s_p.map(|ratio| ratio.median)),
+            &cell(s_p.map(|ratio| ratio.upper)),
+            &cell(s_p.map(|ratio| efficiency(ratio.median, runner.threads))),
+        ]);
+    }
+
+    fn index(&self, runner: Runner) -> Option<usize> {
+        self.runners.iter().position(|&other| other == runner)
+    }
+}
+
+/// How many rounds of some races were marked, in words.
+pub(super) fn marked<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>) -> String {
+    let (mut bad, mut all) = (0, 0);
+    for Outcome { series, .. } in outcomes {
+        bad += series.marked();
+        all += series.rounds().len();
+    }
+    match bad {
+        0 => format!("None of the {all} rounds was marked."),
+        _ if bad == all => format!("All {all} rounds were marked as disturbed; they are shown."),
+        _ => format!("{bad} of {all} rounds were marked as disturbed and are not in the figure."),
+    }
+}

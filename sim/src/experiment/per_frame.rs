@@ -1,0 +1,141 @@
+//! Collisions and speed-up of each frame (§7.2.2): Fig. 15.
+
+use super::error::ExperimentError;
+use super::figure::{Chart, Figure, Line};
+use super::load::RenderLoad;
+use super::outcome::{Outcome, marked};
+use super::race::{Race, Runner};
+use super::scalability::named;
+use super::speedup::speed_up;
+use super::statistics::{Quartiles, variance};
+use super::table::Table;
+use super::timing::Rounds;
+use super::{Laboratory, Report};
+use crate::scene::ParticleScene;
+
+/// What was seen of the frames.
+struct Frames {
+    outcome: Outcome,
+    collisions: Vec<u64>,
+    /// Median speed-ups over the rounds, for each number of threads and frame.
+    speed_ups: Vec<(usize, Vec<f64>)>,
+}
+
+pub(super) fn run(laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentError> {
+    let frames = measure(laboratory)?;
+    let mut rounds = Outcome::rounds_table("per-frame-rounds");
+    frames.outcome.add_rounds(&mut rounds);
+    let tables = vec![frames.table(), frames.summary(), rounds];
+    let figures = vec![frames.collision_figure()?, frames.speed_up_figure()?];
+    Ok(Report { tables, figures, shown: None })
+}
+
+fn measure(laboratory: &mut Laboratory<'_>) -> Result<Frames, ExperimentError> {
+    let plan = laboratory.plan;
+    let sweep = &plan.per_frame;
+    let objects = sweep.objects[0];
+    let scene = ParticleScene { seed: plan.seed, gravity: true, ..ParticleScene::new(objects) };
+    let (frames, rounds) = (sweep.frames, sweep.rounds);
+    // The first frames matter here: they hold most collisions.
+    let race = Race { scene, load: RenderLoad::Null, warm_up: 0, frames, rounds };
+    let runners: Vec<Runner> = plan.threads.iter().copied().map(Runner::pipeline).collect();
+    let mut collisions = vec![0; frames as usize];
+    let mut times = vec![Vec::with_capacity(frames as usize * rounds); runners.len()];
+    let outcome = laboratory.race_observed(race, &runners, &mut |runner, record, took| {
+        collisions[record.frame as usize] = record.pairs.collisions;
+        times[runner].push(took.as_secs_f64());
+    })?;
+    let speed_ups = plan.threads.iter().enumerate();
+    let speed_ups = speed_ups
+        .map(|(runner, &threads)| (threads, by_frame(&outcome, &times[0], &times[runner])))
+        .collect();
+    Ok(Frames { outcome, collisions, speed_ups })
+}
+
+/// The median speed-up of each frame, over the rounds that the outcome rests on. Times are of round
+/// after round.
+fn by_frame(outcome: &Outcome, one_thread: &[f64], threads: &[f64]) -> Vec<f64> {
+    let frames = outcome.race.frames as usize;
+    let good = outcome.series.best_rounds() == Rounds::Good;
+    let marks = outcome.series.marks();
+    let median = |frame: usize| {
+        let rounds = marks.iter().enumerate().filter(|&(_, &bad)| !(good && bad));
+        let places = rounds.map(|(round, _)| round * frames + frame);
+        Quartiles::of(places.map(|place| speed_up(one_thread[place], threads[place])))
+    };
+    (0..frames).filter_map(median).map(|quartiles| quartiles.median).collect()
+}
+
+impl Frames {
+    fn table(&self) -> Table {
+        let names: Vec<String> =
+            self.speed_ups.iter().map(|(threads, _)| format!("s_p_{threads}")).collect();
+        let mut header = vec!["frame", "collisions"];
+        header.extend(names.iter().map(String::as_str));
+        let mut table = Table::new("per-frame", &header);
+        for (frame, collisions) in self.collisions.iter().enumerate() {
+            let mut row = vec![frame.to_string(), collisions.to_string()];
+            row.extend(self.speed_ups.iter().map(|(_, values)| format!("{:.4}", values[frame])));
+            table.rows.push(row);
+        }
+        table
+    }
+
+    fn summary(&self) -> Table {
+        let header = ["threads", "s_p_lower", "s_p_median", "s_p_upper", "s_p_max", "s_p_variance"];
+        let mut table = Table::new("per-frame-summary", &header);
+        for (threads, values) in &self.speed_ups {
+            let Some(quartiles) = Quartiles::of(values.iter().copied()) else { continue };
+            let most = values.iter().copied().fold(0.0, f64::max);
+            let numbers =
+                [quartiles.lower, quartiles.median, quartiles.upper, most, variance(values)];
+            let mut row = vec![threads.to_string()];
+            row.extend(numbers.map(|number| format!("{number:.5}")));
+            table.rows.push(row);
+        }
+        table
+    }
+
+    fn collision_figure(&self) -> Result<Figure, ExperimentError> {
+        let point = |(frame, &count): (usize, &u64)| (frame as f64, count as f64);
+        let points = self.collisions.iter().enumerate().map(point).collect();
+        let counts = || self.collisions.iter().enumerate();
+        let (busiest, most) = counts().max_by_key(|&(_, count)| count).unwrap_or((0, &0));
+        let (calmest, fewest) = counts().min_by_key(|&(_, count)| count).unwrap_or((0, &0));
+        Chart {
+            name: "fig15-collisions",
+            title: format!("Collisions of each frame, {} objects", self.outcome.race.scene.objects),
+            x_label: "frame",
+            y_label: "collisions",
+            finding: format!("The most are {most}, in frame {busiest}; the fewest {fewest}, in frame {calmest}."),
+            paper: "1,646 at first, down to 160 as particles part, up to 1,056 as they pile up (§8.2).",
+            ..Chart::default()
+        }
+        .lines(vec![Line { points, ..Line::default() }])
+    }
+
+    fn speed_up_figure(&self) -> Result<Figure, ExperimentError> {
+        let lines = self.speed_ups.iter().enumerate().map(|(color, (threads, values))| Line {
+            label: named(*threads),
+            points: values.iter().enumerate().map(|(f, &value)| (f as f64, value)).collect(),
+            color,
+            ..Line::default()
+        });
+        let finding = self.speed_ups.iter().skip(1).filter_map(|(threads, values)| {
+            let median = Quartiles::of(values.iter().copied())?.median;
+            let (name, variance) = (named(*threads), variance(values));
+            Some(format!("{name}: median {median:.2}, variance over the frames {variance:.4}. "))
+        });
+        Chart {
+            name: "fig15-speed-up",
+            title: "Speed-up of each frame over one thread".to_owned(),
+            x_label: "frame",
+            y_label: "speed-up S_p = T_1 / T_p",
+            finding: finding.collect::<String>() + &marked([&self.outcome]),
+            paper: "Level, whatever the number of collisions; variance 0.001 to 0.08 with 2 to 6 \
+                    threads (§8.2).",
+            ..Chart::default()
+        }
+        .lines(lines.collect())
+    }
+}

@@ -1,0 +1,211 @@
+//! Runs of one environment, timed against each other.
+
+use std::cell::{Cell, RefCell};
+use std::fmt;
+use std::time::{Duration, Instant};
+
+use super::calibrator::Phase;
+use super::error::ExperimentError;
+use super::load::RenderLoad;
+use super::outcome::Outcome;
+use super::timing::{Contender, Series};
+use crate::executor::{ExecutorKind, FrameRecord};
+use crate::manager::{Settings, VeManager};
+use crate::scene::ParticleScene;
+
+/// Frames before the clock starts; usually 16: shorter runs are mostly cold start.
+pub const WARM_UP: u64 = 16;
+
+/// An executor that takes part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Runner {
+    /// What drives the stages.
+    pub executor: ExecutorKind,
+    /// Threads, the calling one included.
+    pub threads: usize,
+}
+
+impl Runner {
+    /// The serial executor.
+    pub const SERIAL: Self = Self { executor: ExecutorKind::Serial, threads: 1 };
+
+    /// The pipeline with so many threads.
+    #[must_use]
+    pub fn pipeline(threads: usize) -> Self {
+        Self { executor: ExecutorKind::Pipeline, threads }
+    }
+
+    /// Every executor but the serial one, with so many threads; the pipeline comes first.
+    pub fn parallel(threads: usize) -> impl Iterator<Item = Self> {
+        let all = ExecutorKind::ALL.iter();
+        let parallel = all.filter(|&&executor| executor != ExecutorKind::Serial);
+        parallel.map(move |&executor| Self { executor, threads })
+    }
+
+    /// What it is called: the executor and its threads.
+    #[must_use]
+    pub fn label(self) -> String {
+        format!("{} × {}", self.executor.name(), self.threads)
+    }
+
+    pub(super) fn settings(self) -> Settings {
+        Settings { executor: self.executor, threads: self.threads, ..Settings::default() }
+    }
+
+    /// Whether its threads may go on spinning after a run. The pipeline's have ended by then.
+    fn spins(self) -> bool {
+        !matches!(self.executor, ExecutorKind::Serial | ExecutorKind::Pipeline)
+    }
+}
+
+/// An environment, and how long it runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Race {
+    /// The environment.
+    pub scene: ParticleScene,
+    /// What rendering costs.
+    pub load: RenderLoad,
+    /// Frames before the clock starts; usually [`WARM_UP`].
+    pub warm_up: u64,
+    /// Frames that are timed.
+    pub frames: u64,
+    /// The number of rounds.
+    pub rounds: usize,
+}
+
+impl fmt::Display for Race {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { scene, load, frames, .. } = self;
+        write!(f, "{} objects, seed {}, ", scene.objects, scene.seed)?;
+        write!(f, "render {}, {frames} frames", load.name())
+    }
+}
+
+/// What a race tells while it goes on.
+pub(super) type OnFrame<'a> = dyn FnMut(usize, &FrameRecord, Duration) + 'a;
+
+impl Race {
+    /// Times the runners against each other. `phase` measures the machine's present phase, `done` is
+    /// told after each run.
+    ///
+    /// # Errors
+    /// The environment cannot be built or run, an object was quarantined, or the runs did not all end
+    /// in the same state.
+    pub fn run(
+        &self,
+        runners: &[Runner],
+        phase: &mut dyn FnMut() -> Phase,
+        done: &mut dyn FnMut(),
+    ) -> Result<Outcome, ExperimentError> {
+        self.observed(runners, phase, done, &mut |_, _, _| ())
+    }
+
+    /// As [`Race::run`]; `on_frame` is told of each timed frame the runner, the frame and its time
+    /// from swap to swap.
+    pub(super) fn observed(
+        &self,
+        runners: &[Runner],
+        phase: &mut dyn FnMut() -> Phase,
+        done: &mut dyn FnMut(),
+        on_frame: &mut OnFrame<'_>,
+    ) -> Result<Outcome, ExperimentError> {
+        let expected = Cell::new(None);
+        let on_frame = RefCell::new(on_frame);
+        let contender = |(index, &runner): (usize, &Runner)| {
+            let (expected, on_frame) = (&expected, &on_frame);
+            let run = move || {
+                let on_frame = &mut **on_frame.borrow_mut();
+                self.once(runner, expected, &mut |record, took| on_frame(index, record, took))
+            };
+            Contender { label: runner.label(), spins: runner.spins(), run: Box::new(run) }
+        };
+        let mut contenders: Vec<Contender<'_>> =
+            runners.iter().enumerate().map(contender).collect();
+        let series = Series::measure(&mut contenders, self.rounds, phase, done)?;
+        drop(contenders);
+        Ok(Outcome { race: *self, runners: runners.to_vec(), series })
+    }
+
+    /// Seconds of one run.
+    ///
+    /// # Errors
+    /// The environment cannot be built or run, or an object was quarantined.
+    pub fn seconds(&self, runner: Runner) -> Result<f64, ExperimentError> {
+        self.once(runner, &Cell::new(None), &mut |_, _| ())
+    }
+
+    /// Seconds of one run, which must end in the expected state, if one is known.
+    fn once(
+        &self,
+        runner: Runner,
+        expected: &Cell<Option<u64>>,
+        on_frame: &mut dyn FnMut(&FrameRecord, Duration),
+    ) -> Result<f64, ExperimentError> {
+        let mut manager = VeManager::new(self.scene.build()?, runner.settings())?;
+        let mut renderer = self.load.renderer();
+        manager.run(self.warm_up, &mut *renderer, &mut |_| ())?;
+        let began = Instant::now();
+        let mut last = began;
+        manager.run(self.frames, &mut *renderer, &mut |record| {
+            on_frame(record, record.swapped - last);
+            last = record.swapped;
+        })?;
+        let seconds = began.elapsed().as_secs_f64();
+        check(&manager, runner, expected)?;
+        Ok(seconds)
+    }
+}
+
+/// Whether a run did the same as those before.
+fn check(
+    manager: &VeManager,
+    runner: Runner,
+    expected: &Cell<Option<u64>>,
+) -> Result<(), ExperimentError> {
+    let run = || runner.label();
+    let objects = manager.quarantined().len();
+    if objects > 0 {
+        return Err(ExperimentError::Quarantined { run: run(), objects });
+    }
+    let hash = manager.state_hash();
+    match expected.replace(Some(hash)) {
+        Some(expected) if expected != hash => {
+            Err(ExperimentError::Differs { run: run(), hash, expected })
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: Phase = Phase { gain: 2.0, ping_pong: 100.0 };
+
+    #[test]
+    fn every_runner_runs_every_round() {
+        let scene = ParticleScene::new(4);
+        let race = Race { scene, load: RenderLoad::Null, warm_up: 2, frames: 3, rounds: 2 };
+        let runners: Vec<Runner> =
+            std::iter::once(Runner::SERIAL).chain(Runner::parallel(2)).collect();
+        let mut runs = 0;
+        let mut frames = vec![Vec::new(); runners.len()];
+        let mut on_frame =
+            |runner: usize, record: &FrameRecord, _| frames[runner].push(record.frame);
+        let outcome = race
+            .observed(&runners, &mut || GOOD, &mut || runs += 1, &mut on_frame)
+            .expect("a valid race");
+        assert_eq!(runs, 2 * ExecutorKind::ALL.len());
+        assert_eq!(outcome.series.labels()[..2], ["serial × 1", "pipeline × 2"]);
+        assert!(frames.iter().all(|frames| *frames == [2, 3, 4, 2, 3, 4]), "{frames:?}");
+    }
+
+    #[test]
+    fn another_state_is_an_error() {
+        let scene = ParticleScene::new(2);
+        let race = Race { scene, load: RenderLoad::Null, warm_up: 0, frames: 1, rounds: 1 };
+        let other = Cell::new(Some(0));
+        let error = race.once(Runner::SERIAL, &other, &mut |_, _| ()).err();
+        assert!(matches!(error, Some(ExperimentError::Differs { expected: 0, .. })), "{error:?}");
+    }
+}

@@ -1,0 +1,160 @@
+//! Scalability (§7.2.1): Figs. 11 to 13.
+
+use super::error::ExperimentError;
+use super::figure::{Chart, Figure, Line};
+use super::load::RenderLoad;
+use super::outcome::{Outcome, marked};
+use super::race::{Race, Runner, WARM_UP};
+use super::speedup::efficiency;
+use super::{Laboratory, Report};
+use crate::scene::ParticleScene;
+
+pub(super) fn run(laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentError> {
+    let plan = laboratory.plan;
+    let sweep = &plan.scalability;
+    let threads = plan.threads.iter().copied();
+    let runners: Vec<Runner> =
+        std::iter::once(Runner::SERIAL).chain(threads.map(Runner::pipeline)).collect();
+    let mut outcomes = Vec::new();
+    for &objects in &sweep.objects {
+        let scene = ParticleScene { seed: plan.seed, ..ParticleScene::new(objects) };
+        let (frames, rounds) = (sweep.frames, sweep.rounds);
+        let race = Race { scene, load: RenderLoad::Null, warm_up: WARM_UP, frames, rounds };
+        outcomes.push(laboratory.race(race, &runners)?);
+    }
+    let mut rounds = Outcome::rounds_table("scalability-rounds");
+    let mut summary = Outcome::summary_table("scalability");
+    for outcome in &outcomes {
+        outcome.add_rounds(&mut rounds);
+        outcome.add_summary(&mut summary);
+    }
+    let figures = vec![
+        throughput(&outcomes, &plan.threads)?,
+        speed_ups(&outcomes, &plan.threads)?,
+        efficiencies(&outcomes, &plan.threads)?,
+    ];
+    Ok(Report { tables: vec![summary, rounds], figures, shown: None })
+}
+
+/// Fig. 11.
+fn throughput(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, ExperimentError> {
+    let throughput = |runner| {
+        move |outcome: &Outcome| {
+            outcome.throughput(outcome.series.best_rounds(), runner).map(|fps| fps.median)
+        }
+    };
+    let mut lines = vec![Line {
+        dashed: true,
+        color: 6,
+        ..line("serial", outcomes, throughput(Runner::SERIAL))
+    }];
+    lines.extend(threads.iter().enumerate().map(|(color, &count)| Line {
+        color,
+        ..line(&named(count), outcomes, throughput(Runner::pipeline(count)))
+    }));
+    let most = threads.iter().copied().max().unwrap_or(1);
+    let reached = |outcome: Option<&Outcome>| {
+        let outcome = outcome?;
+        let fps = throughput(Runner::pipeline(most))(outcome)?;
+        Some(format!("{fps:.0} frames per second with {} objects", outcome.race.scene.objects))
+    };
+    let ends = [reached(outcomes.first()), reached(outcomes.last())];
+    let ends: Vec<String> = ends.into_iter().flatten().collect();
+    Chart {
+        name: "fig11-throughput",
+        title: "Throughput".to_owned(),
+        x_label: "objects",
+        y_label: "frames per second",
+        finding: format!("{}: {}. {}", named(most), ends.join(", "), marked(outcomes)),
+        paper: "Each additional thread increases the throughput (Fig. 11).",
+        ..Chart::default()
+    }
+    .lines(lines)
+}
+
+/// Fig. 12.
+fn speed_ups(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, ExperimentError> {
+    let ideal = |count: usize, color| Line {
+        label: format!("ideal {count}"),
+        points: outcomes
+            .iter()
+            .map(|outcome| (outcome.race.scene.objects as f64, count as f64))
+            .collect(),
+        dashed: true,
+        color,
+    };
+    let mut lines = Vec::new();
+    for (color, &count) in threads.iter().enumerate() {
+        lines.push(Line { color, ..line(&named(count), outcomes, speed_up(count)) });
+        lines.push(ideal(count, color));
+    }
+    let most = threads.iter().copied().max().unwrap_or(1);
+    let reached = outcomes.iter().filter_map(speed_up(most));
+    let (least, greatest) = range(reached);
+    Chart {
+        name: "fig12-speed-up",
+        title: "Speed-up over one thread".to_owned(),
+        x_label: "objects",
+        y_label: "speed-up S_p = T_1 / T_p",
+        finding: format!(
+            "With {} the speed-up is {least:.2} to {greatest:.2}. {}",
+            named(most),
+            marked(outcomes)
+        ),
+        paper: "Near-linear; it drops by 0.2 to 0.6 % with each 100 further objects (§8.1).",
+        ..Chart::default()
+    }
+    .lines(lines)
+}
+
+/// Fig. 13.
+fn efficiencies(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, ExperimentError> {
+    let efficiency = |count| {
+        let speed_up = speed_up(count);
+        move |outcome: &Outcome| speed_up(outcome).map(|speed_up| efficiency(speed_up, count))
+    };
+    let ideal = line("ideal", outcomes, |_| Some(1.0));
+    let mut lines = vec![Line { dashed: true, color: 6, ..ideal }];
+    lines.extend(
+        threads.iter().enumerate().map(|(color, &count)| Line {
+            color,
+            ..line(&named(count), outcomes, efficiency(count))
+        }),
+    );
+    let all = threads.iter().flat_map(|&count| outcomes.iter().filter_map(efficiency(count)));
+    let (least, _) = range(all);
+    Chart {
+        name: "fig13-efficiency",
+        title: "Thread efficiency".to_owned(),
+        x_label: "objects",
+        y_label: "efficiency E_p = S_p / p",
+        finding: format!("The efficiency is at least {least:.3}. {}", marked(outcomes)),
+        paper: "Greater than 0.89 in all cases, up to 6 threads and 1,000 objects (§8.1, Fig. 13).",
+        ..Chart::default()
+    }
+    .lines(lines)
+}
+
+/// A pipeline's median speed-up over one thread.
+fn speed_up(threads: usize) -> impl Fn(&Outcome) -> Option<f64> + Copy {
+    move |outcome| outcome.median_speed_up(Runner::pipeline(threads), Runner::pipeline(1))
+}
+
+/// A line over the numbers of objects.
+fn line(label: &str, outcomes: &[Outcome], value: impl Fn(&Outcome) -> Option<f64>) -> Line {
+    let point = |outcome: &Outcome| Some((outcome.race.scene.objects as f64, value(outcome)?));
+    let points = outcomes.iter().filter_map(point).collect();
+    Line { label: label.to_owned(), points, ..Line::default() }
+}
+
+/// So many threads, in words.
+pub(super) fn named(threads: usize) -> String {
+    if threads == 1 { "1 thread".to_owned() } else { format!("{threads} threads") }
+}
+
+/// The least and the greatest of some values.
+pub(super) fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, greatest), value| {
+        (least.min(value), greatest.max(value))
+    })
+}

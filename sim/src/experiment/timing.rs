@@ -1,0 +1,211 @@
+//! Contenders timed one after the other in rounds, so that all meet the same phases of the machine.
+
+use std::thread;
+use std::time::Duration;
+
+use super::calibrator::Phase;
+use super::error::ExperimentError;
+use super::statistics::Quartiles;
+
+/// How long to wait after a contender whose threads may go on spinning for a while: 30 ms, more than
+/// the parallel frameworks' threads spin before they sleep.
+const AFTER_SPINNING: Duration = Duration::from_millis(30);
+
+/// Something that is timed.
+pub struct Contender<'a> {
+    /// What it is called.
+    pub label: String,
+    /// Whether its threads may go on spinning after a run.
+    pub spins: bool,
+    /// Runs it once and says how many seconds the timed part took.
+    pub run: Box<dyn FnMut() -> Result<f64, ExperimentError> + 'a>,
+}
+
+/// One round: every contender once.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Round {
+    /// Seconds, for each contender.
+    pub seconds: Vec<f64>,
+    /// The worse of the phases before and after.
+    pub phase: Phase,
+}
+
+/// Which rounds a result is taken over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rounds {
+    /// All of them.
+    All,
+    /// Those that are not marked.
+    Good,
+}
+
+/// The rounds of a set of contenders.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    labels: Vec<String>,
+    rounds: Vec<Round>,
+}
+
+impl Series {
+    /// Times the contenders in so many rounds; each begins with another one. `phase` measures the
+    /// machine's present phase, `done` is told after each run.
+    ///
+    /// # Errors
+    /// Whatever a contender fails with.
+    pub fn measure(
+        contenders: &mut [Contender<'_>],
+        rounds: usize,
+        phase: &mut dyn FnMut() -> Phase,
+        done: &mut dyn FnMut(),
+    ) -> Result<Self, ExperimentError> {
+        let labels = contenders.iter().map(|contender| contender.label.clone()).collect();
+        let count = contenders.len();
+        let mut series = Self { labels, rounds: Vec::with_capacity(rounds) };
+        let mut before = phase();
+        for round in 0..rounds {
+            let mut seconds = vec![0.0; count];
+            for turn in 0..count {
+                let index = (round + turn) % count;
+                let contender = &mut contenders[index];
+                seconds[index] = (contender.run)()?;
+                if contender.spins {
+                    thread::sleep(AFTER_SPINNING);
+                }
+                done();
+            }
+            let after = phase();
+            series.rounds.push(Round { seconds, phase: before.worse(after) });
+            before = after;
+        }
+        Ok(series)
+    }
+
+    /// The contenders' labels.
+    #[must_use]
+    pub fn labels(&self) -> &[String] {
+        &self.labels
+    }
+
+    /// The rounds, in the order in which they were run.
+    #[must_use]
+    pub fn rounds(&self) -> &[Round] {
+        &self.rounds
+    }
+
+    /// For each round, whether it fell into a bad phase.
+    #[must_use]
+    pub fn marks(&self) -> Vec<bool> {
+        let times = self.rounds.iter().map(|round| round.phase.ping_pong);
+        let best = times.fold(f64::INFINITY, f64::min);
+        self.rounds.iter().map(|round| round.phase.is_bad(best)).collect()
+    }
+
+    /// The number of rounds that fell into a bad phase.
+    #[must_use]
+    pub fn marked(&self) -> usize {
+        self.marks().into_iter().filter(|&bad| bad).count()
+    }
+
+    /// The good rounds, or all if none is good.
+    #[must_use]
+    pub fn best_rounds(&self) -> Rounds {
+        if self.marked() < self.rounds.len() { Rounds::Good } else { Rounds::All }
+    }
+
+    /// The quartiles of what `value` makes of each round's seconds; nothing if there are no such rounds.
+    #[must_use]
+    pub fn quartiles(&self, which: Rounds, value: impl Fn(&[f64]) -> f64) -> Option<Quartiles> {
+        let rounds = self.rounds.iter().zip(self.marks());
+        let chosen = rounds.filter(|(_, bad)| which == Rounds::All || !bad);
+        Quartiles::of(chosen.map(|(round, _)| value(&round.seconds)))
+    }
+
+    /// The quartiles of a contender's seconds.
+    #[must_use]
+    pub fn seconds(&self, which: Rounds, contender: usize) -> Option<Quartiles> {
+        self.quartiles(which, |seconds| seconds[contender])
+    }
+
+    /// The quartiles of the rounds' ratios of `slow`'s seconds to `fast`'s.
+    #[must_use]
+    pub fn ratio(&self, which: Rounds, slow: usize, fast: usize) -> Option<Quartiles> {
+        self.quartiles(which, |seconds| seconds[slow] / seconds[fast])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+
+    use super::*;
+
+    const GOOD: Phase = Phase { gain: 2.0, ping_pong: 100.0 };
+
+    fn contender<'a>(label: &'a str, order: &'a RefCell<String>) -> Contender<'a> {
+        let mut runs = 0.0;
+        Contender {
+            label: label.to_owned(),
+            spins: false,
+            run: Box::new(move || {
+                order.borrow_mut().push_str(label);
+                runs += 1.0;
+                Ok(if label == "a" { runs } else { 2.0 * runs })
+            }),
+        }
+    }
+
+    fn series(phases: &[Phase]) -> (Series, String) {
+        let order = RefCell::default();
+        let mut contenders = ["a", "b", "c"].map(|label| contender(label, &order));
+        let mut phases = phases.iter().copied();
+        let mut next = || phases.next().unwrap_or(GOOD);
+        let series = Series::measure(&mut contenders, 4, &mut next, &mut || ());
+        drop(contenders);
+        (series.expect("no contender fails"), order.into_inner())
+    }
+
+    #[test]
+    fn the_order_rotates() {
+        let (series, order) = series(&[]);
+        assert_eq!(order, "abcbcacababc");
+        assert_eq!(series.rounds()[3].seconds, [4.0, 8.0, 8.0]);
+        assert_eq!(series.marked(), 0);
+        let seconds = series.seconds(Rounds::All, 0).expect("there are rounds");
+        assert_eq!((seconds.lower, seconds.median, seconds.upper), (1.75, 2.5, 3.25));
+        assert_eq!(series.ratio(Rounds::Good, 1, 0).map(|ratio| ratio.median), Some(2.0));
+    }
+
+    #[test]
+    fn a_bad_calibrator_marks_rounds() {
+        let lost_core = Phase { gain: 1.2, ..GOOD };
+        // A bad phase counts towards the rounds on both of its sides.
+        let (series, _) = series(&[GOOD, lost_core, GOOD, GOOD, GOOD]);
+        assert_eq!(series.marks(), [true, true, false, false]);
+        assert_eq!(series.rounds().len(), 4, "marked rounds are kept");
+        assert_eq!(series.seconds(Rounds::Good, 0).map(|seconds| seconds.median), Some(3.5));
+        assert_eq!(series.seconds(Rounds::All, 0).map(|seconds| seconds.median), Some(2.5));
+    }
+
+    #[test]
+    fn slow_communication_marks_rounds() {
+        let slow = Phase { ping_pong: 301.0, ..GOOD };
+        let (series, _) = series(&[GOOD, GOOD, slow, slow, slow]);
+        assert_eq!(series.marks(), [false, true, true, true]);
+    }
+
+    #[test]
+    fn nothing_but_bad_rounds() {
+        let (series, _) = series(&[Phase { gain: 1.0, ..GOOD }; 5]);
+        assert_eq!(series.marked(), 4);
+        assert_eq!(series.best_rounds(), Rounds::All);
+        assert_eq!(series.seconds(Rounds::Good, 0), None);
+    }
+
+    #[test]
+    fn failures_are_passed_on() {
+        let fail = || Err(ExperimentError::Quarantined { run: "a".to_owned(), objects: 1 });
+        let mut contenders =
+            [Contender { label: "a".to_owned(), spins: true, run: Box::new(fail) }];
+        assert!(Series::measure(&mut contenders, 1, &mut || GOOD, &mut || ()).is_err());
+    }
+}

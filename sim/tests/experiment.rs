@@ -1,0 +1,75 @@
+//! Tiny experiments: what they write, and that it is whole.
+#![cfg(feature = "experiment")]
+#![forbid(unsafe_code)]
+
+use std::fs;
+
+use dualframe_sim::executor::ExecutorKind;
+use dualframe_sim::experiment::plan::{Plan, Sweep};
+use dualframe_sim::experiment::{Experiment, PAGE, run};
+
+fn tiny() -> Plan {
+    let sweep = |objects: &[usize], rounds| Sweep { objects: objects.to_vec(), frames: 5, rounds };
+    Plan {
+        seed: 3,
+        threads: vec![1, 2],
+        scalability: sweep(&[3, 6], 2),
+        load_balance: sweep(&[4, 500], 1),
+        per_frame: sweep(&[5], 2),
+        compare: sweep(&[3, 5], 2),
+    }
+}
+
+#[test]
+fn all_experiments() {
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let plan = tiny();
+    let mut work = 0;
+    let reports = run(&Experiment::ALL, &plan, out.path(), &mut |_, done| work += done)
+        .expect("tiny experiments run");
+    let all: u64 = Experiment::ALL.iter().map(|experiment| experiment.work(&plan)).sum();
+    assert_eq!(work, all, "progress ends where it should");
+
+    let read = |name: &str| fs::read_to_string(out.path().join(name)).expect("it was written");
+    let rows = |name: &str| {
+        let text = read(name);
+        let mut lines = text.lines().map(|line| line.split(',').count());
+        let columns = lines.next().expect("a header");
+        assert!(lines.all(|cells| cells == columns), "{name}");
+        text.lines().count() - 1
+    };
+    let runners = 1 + 2 * (ExecutorKind::ALL.len() - 1);
+    assert_eq!(rows("scalability-rounds.csv"), 2 * 2 * 3);
+    assert_eq!(rows("load-balance.csv"), 2 * 2);
+    assert_eq!(rows("per-frame.csv"), 5);
+    assert_eq!(rows("per-frame-summary.csv"), 2);
+    assert_eq!(rows("per-frame-rounds.csv"), 2 * 2);
+    assert_eq!(rows("compare-rounds.csv"), 2 * 2 * 2 * runners);
+    // Over all rounds there is a row for each; over the good ones, if there are any.
+    assert!((2 * 3..=2 * 2 * 3).contains(&rows("scalability.csv")));
+    assert!((4 * runners..=2 * 4 * runners).contains(&rows("compare.csv")));
+
+    let page = read(PAGE);
+    let figures: Vec<_> = reports.iter().flat_map(|report| &report.figures).collect();
+    assert_eq!(figures.len(), 3 + 1 + 2 + 4);
+    for figure in figures {
+        assert_eq!(read(&format!("{}.svg", figure.name)), figure.svg);
+        let png =
+            fs::read(out.path().join(format!("{}.png", figure.name))).expect("it was written");
+        assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n", "{}", figure.name);
+        let drawing = &figure.svg[figure.svg.find("<svg").expect("an SVG")..];
+        assert!(page.contains(drawing), "{} is in the page", figure.name);
+        assert!(!figure.finding.is_empty() && !figure.paper.is_empty(), "{}", figure.name);
+    }
+    for outside in ["src=", "href=", "url(http", "@import", "<script", "<link"] {
+        assert!(!page.contains(outside), "{outside}: the page needs nothing else");
+    }
+    assert!(page.contains("seed 3") && page.contains("Table 1"));
+}
+
+#[test]
+fn a_folder_that_is_not_there() {
+    let out = std::path::Path::new("/no/such/folder");
+    let error = run(&[Experiment::PerFrame], &tiny(), out, &mut |_, _| ()).err();
+    assert!(error.is_some_and(|error| error.to_string().contains("/no/such/folder")));
+}
