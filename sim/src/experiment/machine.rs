@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::pool::cores;
+use crate::simd::Simd;
 
 /// The machine and the build.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -15,8 +16,8 @@ pub struct Machine {
     pub system: &'static str,
     /// The instruction set that the program was built for.
     pub architecture: &'static str,
-    /// How wide the kernels work.
-    pub kernel_width: &'static str,
+    /// The vector instructions that the kernels use.
+    pub instructions: &'static str,
 }
 
 impl Machine {
@@ -28,25 +29,20 @@ impl Machine {
             cores: cores(),
             system: std::env::consts::OS,
             architecture: std::env::consts::ARCH,
-            kernel_width: kernel_width(),
+            instructions: Simd::detect().instructions().name(),
         }
     }
 }
 
 impl fmt::Display for Machine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { processor, cores, system, architecture, kernel_width } = self;
+        let Self { processor, cores, system, architecture, instructions } = self;
         let plural = if *cores == 1 { "" } else { "s" };
         write!(
             f,
-            "{processor}, {cores} core{plural}, {system} {architecture}, kernels {kernel_width}"
+            "{processor}, {cores} core{plural}, {system} {architecture}, kernels {instructions}"
         )
     }
-}
-
-/// How wide the kernels work on this machine.
-fn kernel_width() -> &'static str {
-    "as compiled"
 }
 
 /// What Linux says of the processor; other systems are not asked.
