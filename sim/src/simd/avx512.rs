@@ -4,7 +4,7 @@
 use std::arch::x86_64::*;
 
 use super::avx2::Avx2;
-use super::{Isa, Kernel, Lanes3, Quad};
+use super::{Isa, Kernel, LaneSet, Lanes3, Quad};
 use crate::geometry::{LANES, Lanes};
 
 /// The proof that the machine has AVX-512F. There is none without.
@@ -95,6 +95,53 @@ impl Isa for Avx512 {
             _mm256_add_ps(_mm512_castps512_ps256(vector), _mm256_castpd_ps(upper))
         };
         self.0.sum_of_half(half)
+    }
+
+    #[inline(always)]
+    fn min(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_min_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn max(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_max_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn less(self, a: __m512, b: __m512) -> LaneSet {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b) }
+    }
+
+    #[inline(always)]
+    fn at_most(self, a: __m512, b: __m512) -> LaneSet {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b) }
+    }
+
+    #[inline(always)]
+    fn compress(
+        self,
+        kept: LaneSet,
+        first: u32,
+        vectors: [__m512; 3],
+        nodes: &mut [u32; LANES],
+        to: [&mut Lanes; 3],
+    ) {
+        // SAFETY: as in `splat`; the pointer is that of sixteen numbers.
+        unsafe {
+            let lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+            let numbers = _mm512_add_epi32(_mm512_set1_epi32(first as i32), lanes);
+            let numbers = _mm512_maskz_compress_epi32(kept, numbers);
+            _mm512_storeu_si512(nodes.as_mut_ptr().cast(), numbers);
+        }
+        for (axis, to) in to.into_iter().enumerate() {
+            // SAFETY: as in `splat`.
+            let kept = unsafe { _mm512_maskz_compress_ps(kept, vectors[axis]) };
+            self.store(kept, to);
+        }
     }
 
     #[inline(always)]
