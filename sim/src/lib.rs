@@ -18,7 +18,7 @@
 //! | §6.2: messages | [`message`] |
 //! | §7.1.1: particles | [`scene`] |
 //! | §7.2: the pipeline and what it is compared with | [`executor`] |
-//! | — | kernels in vector instructions | [`simd`] |
+//! | (not in the paper) kernels in vector instructions | [`simd`] |
 
 #![deny(unsafe_code)]
 

@@ -37,7 +37,7 @@ fn with_avx512<K: Kernel>(avx512: Avx512, kernel: K) -> K::Output {
 
 impl Isa for Avx512 {
     type Vector = __m512;
-    type Table<'a> = [[__m512; Avx512::MOST_CHUNKS]; 3];
+    type Table<'a> = [[__m512; 3]; Avx512::MOST_CHUNKS];
 
     #[inline(always)]
     fn splat(self, value: f32) -> __m512 {
@@ -146,12 +146,10 @@ impl Isa for Avx512 {
 
     #[inline(always)]
     fn table<'a>(self, chunks: &[Lanes3], _: &'a mut Vec<Quad>) -> Self::Table<'a> {
-        let mut table = [[self.splat(0.0); Self::MOST_CHUNKS]; 3];
-        for chunk in 0..Self::MOST_CHUNKS {
-            if let Some(Lanes3(components)) = chunks.get(chunk) {
-                for axis in 0..3 {
-                    table[axis][chunk] = self.load(&components[axis]);
-                }
+        let mut table = [[self.splat(0.0); 3]; Self::MOST_CHUNKS];
+        for (chunk, vectors) in table.iter_mut().enumerate() {
+            if let Some(Lanes3([x, y, z])) = chunks.get(chunk) {
+                *vectors = [self.load(x), self.load(y), self.load(z)];
             }
         }
         table
@@ -165,12 +163,12 @@ impl Isa for Avx512 {
             (nodes, _mm512_test_epi32_mask(nodes, _mm512_set1_epi32(32)))
         };
         let mut found = [self.splat(0.0); 3];
+        let [first, second, third] = table;
         for axis in 0..3 {
-            let [first, second, third] = table[axis];
             // SAFETY: as in `splat`.
             found[axis] = unsafe {
-                let found = _mm512_permutex2var_ps(first, nodes, second);
-                _mm512_mask_permutexvar_ps(found, in_third, nodes, third)
+                let found = _mm512_permutex2var_ps(first[axis], nodes, second[axis]);
+                _mm512_mask_permutexvar_ps(found, in_third, nodes, third[axis])
             };
         }
         found
