@@ -1,10 +1,10 @@
 //! The widest vector instructions that the machine has, chosen at run time, with the same bits from
 //! every width.
 //!
-//! A kernel is written once, over [`Isa`]: sixteen lanes and the operations on them. [`Simd::run`]
+//! A kernel is written once, over `Isa`: sixteen lanes and the operations on them. `Simd::run`
 //! compiles it for every set of instructions and picks one. Each operation is the IEEE 754 one, rounded
 //! once: there is no fused multiply-add, no approximate reciprocal, and sums over lanes have one order,
-//! [`fold`]'s. So a lane comes out the same whatever it was computed beside.
+//! `fold`'s. So a lane comes out the same whatever it was computed beside.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
