@@ -4,6 +4,7 @@ use crate::behavior::{Segment, Workspace};
 use crate::geometry::{Bounds, LANES, Lanes};
 use crate::interaction::{Contact, group_set};
 use crate::object::{Object, ObjectId};
+use crate::simd::{LaneSet, first_lanes, lanes};
 
 /// One or more objects that go through the stages together, in ascending order of their numbers.
 #[derive(Default)]
@@ -143,16 +144,17 @@ impl Boxes {
     ) -> impl Iterator<Item = usize> + use<'_> {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
         (first / LANES..self.min[0].len()).flat_map(move |chunk| {
-            let mut hits = [true; LANES];
+            let mut hits = LaneSet::MAX;
             for axis in 0..3 {
                 let (low, high) = (&self.min[axis][chunk], &self.max[axis][chunk]);
                 for lane in 0..LANES {
-                    hits[lane] &= (low[lane] <= max[axis]) & (high[lane] >= min[axis]);
+                    let overlap = (low[lane] <= max[axis]) & (high[lane] >= min[axis]);
+                    hits &= !(LaneSet::from(!overlap) << lane);
                 }
             }
-            let lanes = if hits == [false; LANES] { 0 } else { LANES };
-            let places = (0..lanes).filter(move |&lane| hits[lane]);
-            places.map(move |lane| chunk * LANES + lane).filter(move |&place| place >= first)
+            let start = chunk * LANES;
+            let places = lanes(hits & !first_lanes(first.saturating_sub(start)));
+            places.map(move |lane| start + lane)
         })
     }
 }

@@ -18,8 +18,8 @@
 //! | §6.2: messages | [`message`] |
 //! | §7.1.1: particles | [`scene`] |
 //! | §7.2: the pipeline and what it is compared with | [`executor`] |
-//! | — | kernels in vector instructions | [`simd`] |
 //! | §7–§8: Eqs. 2–4, Figs. 11–17, Table 1 | `experiment`, with the feature of that name |
+//! | (not in the paper) kernels in vector instructions | [`simd`] |
 
 #![deny(unsafe_code)]
 

@@ -116,7 +116,7 @@ impl Stages {
         sink: &mut impl ContactSink,
     ) -> Result<PairCount, TableFull> {
         let Some((pair, bodies)) = self.rules.find(a, b) else { return Ok(PairCount::default()) };
-        let touched = scratch.interact(pair, bodies, self.time_step, sink)?;
+        let touched = scratch.interact(pair, bodies, self, sink)?;
         Ok(PairCount { candidates: 1, collisions: u64::from(touched) })
     }
 

@@ -105,8 +105,7 @@ fn state(seed: u64, simd: Simd) -> Vec<u32> {
     assert_eq!(object.quarantined(), None, "seed {seed}");
     let mesh = object.geometry.as_mesh().expect("a body");
     let vectors = mesh.positions.iter().chain(mesh.velocities.iter());
-    let bits = vectors.flat_map(|vector| vector.to_array().map(f32::to_bits)).collect();
-    bits
+    vectors.flat_map(|vector| vector.to_array().map(f32::to_bits)).collect()
 }
 
 #[test]

@@ -130,8 +130,8 @@ fn pull(Node(a): &Node, Node(b): &Node, rest: f32, stiffness: f32) -> Node {
         let way = [b[0][lane] - a[0][lane], b[1][lane] - a[1][lane], b[2][lane] - a[2][lane]];
         let square = way[0] * way[0] + way[1] * way[1] + way[2] * way[2] + 1e-30;
         let pull = stiffness * (1.0 - rest / square.sqrt());
-        for axis in 0..3 {
-            force.0[axis][lane] = pull * way[axis];
+        for (force, way) in force.0.iter_mut().zip(way) {
+            force[lane] = pull * way;
         }
     }
     force

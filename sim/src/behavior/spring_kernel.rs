@@ -168,9 +168,10 @@ fn load<I: Isa>(isa: I, lanes: &Lanes3) -> [I::Vector; 3] {
 
 #[inline(always)]
 fn store<I: Isa>(isa: I, vectors: [I::Vector; 3], lanes: &mut Lanes3) {
-    for axis in 0..3 {
-        isa.store(vectors[axis], &mut lanes.0[axis]);
-    }
+    let ([x, y, z], [to_x, to_y, to_z]) = (vectors, &mut lanes.0);
+    isa.store(x, to_x);
+    isa.store(y, to_y);
+    isa.store(z, to_z);
 }
 
 // Not by `map`: what the library does not inline is compiled for the baseline.

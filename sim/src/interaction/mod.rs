@@ -15,6 +15,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::geometry::LANES;
 use crate::object::Object;
+use crate::stages::Stages;
 
 pub use contact::{Contact, ContactBuffer, ContactSink, TableFull};
 pub use impulses::Impulses;
@@ -76,10 +77,11 @@ impl Scratch {
         &mut self,
         pair: &InteractionPair,
         bodies: [&Object; 2],
-        time_step: f32,
+        stages: &Stages,
         sink: &mut impl ContactSink,
     ) -> Result<bool, TableFull> {
         self.touches.clear();
+        self.touches.simd = stages.simd;
         for (impulses, body) in self.impulses.iter_mut().zip(bodies) {
             impulses.reset(body.geometry.as_mesh().map_or(0, |mesh| mesh.positions.len()));
         }
@@ -88,7 +90,12 @@ impl Scratch {
             pair.detection.detect(first, second, &mut self.touches);
             if !self.touches.list().is_empty() {
                 let [on_first, on_second] = &mut self.impulses;
-                pair.response.respond(bodies, &self.touches, time_step, [on_first, on_second]);
+                pair.response.respond(
+                    bodies,
+                    &self.touches,
+                    stages.time_step,
+                    [on_first, on_second],
+                );
             }
         }));
         if done.is_err() {

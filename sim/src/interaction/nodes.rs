@@ -5,8 +5,9 @@ use glam::Vec3;
 use super::Detection;
 use super::contact::Contact;
 use super::touches::{NearNodes, Touch, Touches};
-use crate::geometry::{LANES, Lanes};
+use crate::geometry::{Bounds, LANES, Mesh};
 use crate::object::Object;
+use crate::simd::{Isa, Kernel, lanes};
 
 /// Finds the pairs of nodes whose contact spheres overlap. With spheres of about 0.3 of a body's
 /// radius the surface is closed: no node of another body fits between them.
@@ -26,18 +27,10 @@ impl Detection for NodeSpheres {
             return;
         };
         self.detect_cores(first.center(), second.center(), touches);
-        let (list, [near_a, near_b]) = touches.parts();
-        // A node touches only if its sphere reaches the box around the other's spheres; and only
-        // those of the other's nodes matter that are in reach of one that does.
-        near_a.select(a, &second.bounds().inflated(a.contact_radius()));
-        if near_a.nodes().is_empty() {
-            return;
-        }
-        let reach = a.contact_radius() + b.contact_radius();
-        near_b.select(b, &near_a.bounds().inflated(reach * ROUNDING_MARGIN));
-        for (index, &node) in near_a.nodes().iter().enumerate() {
-            against_all(near_a.position(index), node, near_b, reach, list);
-        }
+        let bounds = second.bounds().inflated(a.contact_radius());
+        let simd = touches.simd;
+        let (list, near) = touches.parts();
+        simd.run(Overlaps { meshes: [a, b], bounds, near, list });
     }
 }
 
@@ -58,19 +51,59 @@ impl NodeSpheres {
 /// Keeps the rounding of a box from hiding a touch that the distance would show.
 const ROUNDING_MARGIN: f32 = 1.001;
 
-/// Tests one node's sphere against all near spheres of the other body.
-fn against_all(own: [f32; 3], node: u32, others: &NearNodes, reach: f32, list: &mut Vec<Touch>) {
-    let reach_squared = reach * reach;
-    for (chunk, other) in others.chunks().enumerate() {
-        let squares = squared_distances(own, other);
-        let mut hits = [false; LANES];
-        for lane in 0..LANES {
-            hits[lane] = squares[lane] < reach_squared;
+/// The search for overlapping spheres of two meshes.
+struct Overlaps<'a> {
+    meshes: [&'a Mesh; 2],
+    /// Around the second's spheres, grown by the first's radius.
+    bounds: Bounds,
+    near: &'a mut [NearNodes; 2],
+    list: &'a mut Vec<Touch>,
+}
+
+impl Kernel for Overlaps<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) {
+        let Self { meshes: [a, b], bounds, near: [near_a, near_b], list } = self;
+        // A node touches only if its sphere reaches the box around the other's spheres; and only
+        // those of the other's nodes matter that are in reach of one that does.
+        near_a.select(isa, a, &bounds);
+        if near_a.nodes().is_empty() {
+            return;
         }
-        if hits == [false; LANES] {
+        let reach = a.contact_radius() + b.contact_radius();
+        near_b.select(isa, b, &near_a.bounds(isa).inflated(reach * ROUNDING_MARGIN));
+        for (index, &node) in near_a.nodes().iter().enumerate() {
+            against_all(isa, near_a.position(index), node, near_b, reach, list);
+        }
+    }
+}
+
+/// Tests one node's sphere against all near spheres of the other body.
+#[inline(always)]
+fn against_all<I: Isa>(
+    isa: I,
+    own: [f32; 3],
+    node: u32,
+    others: &NearNodes,
+    reach: f32,
+    list: &mut Vec<Touch>,
+) {
+    let reach_squared = isa.splat(reach * reach);
+    for (chunk, (other, there)) in others.chunks().enumerate() {
+        let mut square = isa.splat(0.0);
+        for axis in 0..3 {
+            let way = isa.sub(isa.splat(own[axis]), isa.load(other[axis]));
+            square = isa.add(square, isa.mul(way, way));
+        }
+        let hits = isa.less(square, reach_squared) & there;
+        if hits == 0 {
             continue;
         }
-        for lane in (0..LANES).filter(|&lane| hits[lane]) {
+        let mut squares = [0.0; LANES];
+        isa.store(square, &mut squares);
+        for lane in lanes(hits) {
             let distance = squares[lane].sqrt();
             list.push(Touch {
                 nodes: [node, others.nodes()[chunk * LANES + lane]],
@@ -79,18 +112,6 @@ fn against_all(own: [f32; 3], node: u32, others: &NearNodes, reach: f32, list: &
             });
         }
     }
-}
-
-#[inline(always)]
-fn squared_distances(own: [f32; 3], other: [&Lanes; 3]) -> Lanes {
-    let mut squares = [0.0; LANES];
-    for axis in 0..3 {
-        for lane in 0..LANES {
-            let way = own[axis] - other[axis][lane];
-            squares[lane] += way * way;
-        }
-    }
-    squares
 }
 
 /// The unit vector from `b` to `a`; upwards where they coincide.

@@ -4,9 +4,10 @@ use glam::Vec3;
 
 use super::Detection;
 use super::contact::Contact;
-use super::touches::{Touch, Touches};
-use crate::geometry::{LANES, Mesh, Rigid};
+use super::touches::{NearNodes, Touch, Touches};
+use crate::geometry::{Bounds, LANES, Mesh, Rigid};
 use crate::object::Object;
+use crate::simd::{Isa, Kernel};
 
 /// Finds the nodes whose contact spheres reach into a rigid shape. The pair's first object is the
 /// deformable one. Walls are tested directly, other shapes by parry's exact point projection.
@@ -48,10 +49,27 @@ fn behind_plane(mesh: &Mesh, point: Vec3, normal: Vec3, touches: &mut Touches) {
     }
 }
 
-fn in_shape(mesh: &Mesh, rigid: &Rigid, bounds: &crate::geometry::Bounds, touches: &mut Touches) {
+/// The search for a mesh's nodes in a box.
+struct Select<'a> {
+    mesh: &'a Mesh,
+    bounds: Bounds,
+    near: &'a mut NearNodes,
+}
+
+impl Kernel for Select<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) {
+        self.near.select(isa, self.mesh, &self.bounds);
+    }
+}
+
+fn in_shape(mesh: &Mesh, rigid: &Rigid, bounds: &Bounds, touches: &mut Touches) {
     let radius = mesh.contact_radius();
+    let simd = touches.simd;
     let (list, [near, _]) = touches.parts();
-    near.select(mesh, &bounds.inflated(radius));
+    simd.run(Select { mesh, bounds: bounds.inflated(radius), near });
     for (index, &node) in near.nodes().iter().enumerate() {
         let position = Vec3::from_array(near.position(index));
         let projection = rigid.shape.project_point(&rigid.pose, position, false);

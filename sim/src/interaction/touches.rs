@@ -1,7 +1,7 @@
 //! The results module of an interaction pair (Fig. 3): what detection found.
 
-use crate::geometry::Bounds;
-use crate::geometry::{LANES, Lanes, Mesh};
+use crate::geometry::{Bounds, LANES, Lanes, Mesh};
+use crate::simd::{Isa, LaneSet, Simd, first_lanes};
 
 /// A place where two objects touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +21,7 @@ pub struct Touch {
 pub struct Touches {
     list: Vec<Touch>,
     pub(super) near: [NearNodes; 2],
+    pub(super) simd: Simd,
 }
 
 /// Touches of one pair for which there is room from the start; usually 2,048, more than two particles
@@ -29,7 +30,7 @@ const ROOM: usize = 2_048;
 
 impl Default for Touches {
     fn default() -> Self {
-        Self { list: Vec::with_capacity(ROOM), near: Default::default() }
+        Self { list: Vec::with_capacity(ROOM), near: Default::default(), simd: Simd::detect() }
     }
 }
 
@@ -59,43 +60,42 @@ impl Touches {
 #[derive(Debug, Default)]
 pub(super) struct NearNodes {
     nodes: Vec<u32>,
-    components: [Vec<Lanes>; 3],
+    components: [Vec<f32>; 3],
     len: usize,
 }
 
 impl NearNodes {
     /// Takes the nodes inside `bounds`, in ascending order.
-    pub(super) fn select(&mut self, mesh: &Mesh, bounds: &Bounds) {
+    #[inline(always)]
+    pub(super) fn select<I: Isa>(&mut self, isa: I, mesh: &Mesh, bounds: &Bounds) {
         let [x, y, z] = mesh.positions.components.each_ref();
         self.reserve(x.len());
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
+        let nodes = mesh.positions.len();
         let mut len = 0;
         for (chunk, ((x, y), z)) in x.iter().zip(y).zip(z).enumerate() {
-            let mut inside = [true; LANES];
-            for (axis, lanes) in [x, y, z].into_iter().enumerate() {
-                for (inside, &value) in inside.iter_mut().zip(lanes) {
-                    *inside &= (value >= min[axis]) & (value <= max[axis]);
-                }
+            let first = chunk * LANES;
+            let vectors = [isa.load(x), isa.load(y), isa.load(z)];
+            // The padding lies at the origin, which may be inside.
+            let mut inside = first_lanes(nodes - first);
+            for axis in 0..3 {
+                inside &= isa.at_most(isa.splat(min[axis]), vectors[axis]);
+                inside &= isa.at_most(vectors[axis], isa.splat(max[axis]));
             }
-            if inside == [false; LANES] {
-                continue;
+            if inside != 0 {
+                let [x, y, z] = self.components.each_mut();
+                let to = [lanes_at(x, len), lanes_at(y, len), lanes_at(z, len)];
+                isa.compress(inside, first as u32, vectors, lanes_at(&mut self.nodes, len), to);
+                len += inside.count_ones() as usize;
             }
-            for (lane, inside) in inside.into_iter().enumerate() {
-                // Written in any case, kept only if inside: no branch to be mispredicted.
-                self.nodes[len] = (chunk * LANES + lane) as u32;
-                for (near, lanes) in self.components.iter_mut().zip([x, y, z]) {
-                    near.as_flattened_mut()[len] = lanes[lane];
-                }
-                len += usize::from(inside);
-            }
-        }
-        // The padding lies at the origin, which may be inside.
-        let nodes = mesh.positions.len() as u32;
-        while len > 0 && self.nodes[len - 1] >= nodes {
-            len -= 1;
         }
         self.len = len;
-        self.pad();
+        // Room for whole lanes, which hold the last node once more: no box grows by it.
+        for component in &mut self.components {
+            if let Some(&last) = component[..len].last() {
+                component[len..len + LANES].fill(last);
+            }
+        }
     }
 
     /// The nodes' numbers.
@@ -105,41 +105,57 @@ impl NearNodes {
 
     /// The position of the node at `index` of [`NearNodes::nodes`], in metres.
     pub(super) fn position(&self, index: usize) -> [f32; 3] {
-        self.components.each_ref().map(|component| component.as_flattened()[index])
+        self.components.each_ref().map(|component| component[index])
     }
 
-    /// The positions in whole lanes; beyond the last node they are infinitely far away.
-    pub(super) fn chunks(&self) -> impl Iterator<Item = [&Lanes; 3]> + '_ {
-        let [x, y, z] = self.components.each_ref().map(|c| &c[..self.len.div_ceil(LANES)]);
-        x.iter().zip(y).zip(z).map(|((x, y), z)| [x, y, z])
+    /// The positions in whole lanes, and in which there are nodes.
+    #[inline(always)]
+    pub(super) fn chunks(&self) -> impl Iterator<Item = ([&Lanes; 3], LaneSet)> + '_ {
+        let [x, y, z] = self.components.each_ref().map(|c| c.as_chunks::<LANES>().0);
+        let there = (0..self.len).step_by(LANES).map(|first| first_lanes(self.len - first));
+        x.iter().zip(y).zip(z).map(|((x, y), z)| [x, y, z]).zip(there)
     }
 
     /// The box around the nodes.
-    pub(super) fn bounds(&self) -> Bounds {
+    #[inline(always)]
+    pub(super) fn bounds<I: Isa>(&self, isa: I) -> Bounds {
+        let mut low = [isa.splat(f32::INFINITY); 3];
+        let mut high = [isa.splat(f32::NEG_INFINITY); 3];
+        for (components, _) in self.chunks() {
+            for axis in 0..3 {
+                let lanes = isa.load(components[axis]);
+                low[axis] = isa.min(lanes, low[axis]);
+                high[axis] = isa.max(lanes, high[axis]);
+            }
+        }
         let mut bounds = Bounds::EMPTY;
-        for index in 0..self.len {
-            let point = self.position(index).into();
-            bounds = bounds.union(&Bounds { min: point, max: point });
+        for axis in 0..3 {
+            let (mut lows, mut highs) = ([0.0; LANES], [0.0; LANES]);
+            isa.store(low[axis], &mut lows);
+            isa.store(high[axis], &mut highs);
+            for lane in 0..LANES {
+                bounds.min[axis] = bounds.min[axis].min(lows[lane]);
+                bounds.max[axis] = bounds.max[axis].max(highs[lane]);
+            }
         }
         bounds
     }
 
     /// Makes room for the nodes of so many chunks.
     pub(super) fn reserve(&mut self, chunks: usize) {
-        // One more than can be kept: the last write may be one that is not.
+        // One more than can be kept: whole lanes are written wherever the last one ended.
         let wanted = (chunks + 1) * LANES;
         if self.nodes.len() < wanted {
             self.nodes.resize(wanted, 0);
             for component in &mut self.components {
-                component.resize(chunks + 1, [0.0; LANES]);
+                component.resize(wanted, 0.0);
             }
         }
     }
+}
 
-    fn pad(&mut self) {
-        let end = self.len.next_multiple_of(LANES);
-        for component in &mut self.components {
-            component.as_flattened_mut()[self.len..end].fill(f32::INFINITY);
-        }
-    }
+/// Whole lanes from `start` on.
+#[inline(always)]
+fn lanes_at<T>(values: &mut [T], start: usize) -> &mut [T; LANES] {
+    values[start..].first_chunk_mut().unwrap_or_else(|| unreachable!("`reserve` made room"))
 }

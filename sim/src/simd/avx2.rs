@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{Isa, Kernel, Lanes3, Quad};
+use super::{Isa, Kernel, LaneSet, Lanes3, Quad};
 use crate::geometry::{LANES, Lanes};
 
 /// Lanes of one register.
@@ -160,6 +160,36 @@ impl Isa for Avx2 {
     fn sum(self, vector: Pair) -> f32 {
         // SAFETY: as in `splat`.
         self.sum_of_half(unsafe { _mm256_add_ps(vector[0], vector[1]) })
+    }
+
+    #[inline(always)]
+    fn min(self, a: Pair, b: Pair) -> Pair {
+        // SAFETY: as in `splat`.
+        unsafe { [_mm256_min_ps(a[0], b[0]), _mm256_min_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn max(self, a: Pair, b: Pair) -> Pair {
+        // SAFETY: as in `splat`.
+        unsafe { [_mm256_max_ps(a[0], b[0]), _mm256_max_ps(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn less(self, a: Pair, b: Pair) -> LaneSet {
+        // SAFETY: as in `splat`.
+        let set = |half: usize| unsafe {
+            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a[half], b[half]))
+        };
+        (set(0) | set(1) << HALF) as LaneSet
+    }
+
+    #[inline(always)]
+    fn at_most(self, a: Pair, b: Pair) -> LaneSet {
+        // SAFETY: as in `splat`.
+        let set = |half: usize| unsafe {
+            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a[half], b[half]))
+        };
+        (set(0) | set(1) << HALF) as LaneSet
     }
 
     #[inline(always)]

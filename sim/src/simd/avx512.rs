@@ -4,7 +4,7 @@
 use std::arch::x86_64::*;
 
 use super::avx2::Avx2;
-use super::{Isa, Kernel, Lanes3, Quad};
+use super::{Isa, Kernel, LaneSet, Lanes3, Quad};
 use crate::geometry::{LANES, Lanes};
 
 /// The proof that the machine has AVX-512F. There is none without.
@@ -37,7 +37,7 @@ fn with_avx512<K: Kernel>(avx512: Avx512, kernel: K) -> K::Output {
 
 impl Isa for Avx512 {
     type Vector = __m512;
-    type Table<'a> = [[__m512; Avx512::MOST_CHUNKS]; 3];
+    type Table<'a> = [[__m512; 3]; Avx512::MOST_CHUNKS];
 
     #[inline(always)]
     fn splat(self, value: f32) -> __m512 {
@@ -98,13 +98,58 @@ impl Isa for Avx512 {
     }
 
     #[inline(always)]
+    fn min(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_min_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn max(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_max_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn less(self, a: __m512, b: __m512) -> LaneSet {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b) }
+    }
+
+    #[inline(always)]
+    fn at_most(self, a: __m512, b: __m512) -> LaneSet {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b) }
+    }
+
+    #[inline(always)]
+    fn compress(
+        self,
+        kept: LaneSet,
+        first: u32,
+        vectors: [__m512; 3],
+        nodes: &mut [u32; LANES],
+        to: [&mut Lanes; 3],
+    ) {
+        // SAFETY: as in `splat`; the pointer is that of sixteen numbers.
+        unsafe {
+            let lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+            let numbers = _mm512_add_epi32(_mm512_set1_epi32(first as i32), lanes);
+            let numbers = _mm512_maskz_compress_epi32(kept, numbers);
+            _mm512_storeu_si512(nodes.as_mut_ptr().cast(), numbers);
+        }
+        for (axis, to) in to.into_iter().enumerate() {
+            // SAFETY: as in `splat`.
+            let kept = unsafe { _mm512_maskz_compress_ps(kept, vectors[axis]) };
+            self.store(kept, to);
+        }
+    }
+
+    #[inline(always)]
     fn table<'a>(self, chunks: &[Lanes3], _: &'a mut Vec<Quad>) -> Self::Table<'a> {
-        let mut table = [[self.splat(0.0); Self::MOST_CHUNKS]; 3];
-        for chunk in 0..Self::MOST_CHUNKS {
-            if let Some(Lanes3(components)) = chunks.get(chunk) {
-                for axis in 0..3 {
-                    table[axis][chunk] = self.load(&components[axis]);
-                }
+        let mut table = [[self.splat(0.0); 3]; Self::MOST_CHUNKS];
+        for (chunk, vectors) in table.iter_mut().enumerate() {
+            if let Some(Lanes3([x, y, z])) = chunks.get(chunk) {
+                *vectors = [self.load(x), self.load(y), self.load(z)];
             }
         }
         table
@@ -118,12 +163,12 @@ impl Isa for Avx512 {
             (nodes, _mm512_test_epi32_mask(nodes, _mm512_set1_epi32(32)))
         };
         let mut found = [self.splat(0.0); 3];
+        let [first, second, third] = table;
         for axis in 0..3 {
-            let [first, second, third] = table[axis];
             // SAFETY: as in `splat`.
             found[axis] = unsafe {
-                let found = _mm512_permutex2var_ps(first, nodes, second);
-                _mm512_mask_permutexvar_ps(found, in_third, nodes, third)
+                let found = _mm512_permutex2var_ps(first[axis], nodes, second[axis]);
+                _mm512_mask_permutexvar_ps(found, in_third, nodes, third[axis])
             };
         }
         found

@@ -1,10 +1,10 @@
 //! The widest vector instructions that the machine has, chosen at run time, with the same bits from
 //! every width.
 //!
-//! A kernel is written once, over [`Isa`]: sixteen lanes and the operations on them. [`Simd::run`]
+//! A kernel is written once, over `Isa`: sixteen lanes and the operations on them. `Simd::run`
 //! compiles it for every set of instructions and picks one. Each operation is the IEEE 754 one, rounded
 //! once: there is no fused multiply-add, no approximate reciprocal, and sums over lanes have one order,
-//! [`fold`]'s. So a lane comes out the same whatever it was computed beside.
+//! `fold`'s. So a lane comes out the same whatever it was computed beside.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -176,6 +176,56 @@ pub(crate) trait Isa: Copy {
 
     /// The sum over the lanes, as [`fold`] takes it.
     fn sum(self, vector: Self::Vector) -> f32;
+
+    /// The lesser ones; `b` where one is a NaN.
+    fn min(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    /// The greater ones; `b` where one is a NaN.
+    fn max(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    /// The lanes in which `a` is less than `b`.
+    fn less(self, a: Self::Vector, b: Self::Vector) -> LaneSet;
+    /// The lanes in which `a` is at most `b`.
+    fn at_most(self, a: Self::Vector, b: Self::Vector) -> LaneSet;
+
+    /// Writes the nodes of some lanes, the first of which has the number `first`, and their vectors one
+    /// after the other. What is written after them has no meaning.
+    #[inline(always)]
+    fn compress(
+        self,
+        kept: LaneSet,
+        first: u32,
+        vectors: [Self::Vector; 3],
+        nodes: &mut [u32; LANES],
+        to: [&mut Lanes; 3],
+    ) {
+        let mut from = [[0.0; LANES]; 3];
+        for axis in 0..3 {
+            self.store(vectors[axis], &mut from[axis]);
+        }
+        let [x, y, z] = to;
+        for (place, lane) in lanes(kept).enumerate() {
+            nodes[place] = first + lane as u32;
+            (x[place], y[place], z[place]) = (from[0][lane], from[1][lane], from[2][lane]);
+        }
+    }
+}
+
+/// A set of lanes, a bit each.
+pub(crate) type LaneSet = u16;
+
+/// The lanes of a set, in ascending order.
+#[inline(always)]
+pub(crate) fn lanes(mut set: LaneSet) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = (set != 0).then(|| set.trailing_zeros() as usize);
+        set &= set.wrapping_sub(1);
+        lane
+    })
+}
+
+/// The first so many lanes, or all.
+#[inline(always)]
+pub(crate) fn first_lanes(count: usize) -> LaneSet {
+    if count < LANES { (1 << count) - 1 } else { LaneSet::MAX }
 }
 
 /// The components x, y and z of [`LANES`] consecutive nodes, where loads and stores are fastest: a load

@@ -1,6 +1,6 @@
 //! Lanes as plain arrays, which the compiler makes into whatever the target's baseline has.
 
-use super::{Isa, Lanes3, Quad, fold};
+use super::{Isa, LaneSet, Lanes3, Quad, fold};
 use crate::geometry::{LANES, Lanes};
 
 #[derive(Clone, Copy)]
@@ -13,6 +13,15 @@ fn each(a: Lanes, b: Lanes, operation: impl Fn(f32, f32) -> f32) -> Lanes {
         result[lane] = operation(a[lane], b[lane]);
     }
     result
+}
+
+#[inline(always)]
+fn set(a: Lanes, b: Lanes, holds: impl Fn(f32, f32) -> bool) -> LaneSet {
+    let mut set = 0;
+    for lane in 0..LANES {
+        set |= LaneSet::from(holds(a[lane], b[lane])) << lane;
+    }
+    set
 }
 
 impl Isa for Scalar {
@@ -62,6 +71,26 @@ impl Isa for Scalar {
     #[inline(always)]
     fn sum(self, vector: Lanes) -> f32 {
         fold(vector)
+    }
+
+    #[inline(always)]
+    fn min(self, a: Lanes, b: Lanes) -> Lanes {
+        each(a, b, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn max(self, a: Lanes, b: Lanes) -> Lanes {
+        each(a, b, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn less(self, a: Lanes, b: Lanes) -> LaneSet {
+        set(a, b, |a, b| a < b)
+    }
+
+    #[inline(always)]
+    fn at_most(self, a: Lanes, b: Lanes) -> LaneSet {
+        set(a, b, |a, b| a <= b)
     }
 
     #[inline(always)]
