@@ -1,6 +1,5 @@
 //! What the benches that time whole frames share: arguments and tables.
 
-use std::path::Path;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -57,9 +56,8 @@ pub(crate) fn main(bench: fn(&Arguments) -> Result<(), ExperimentError>) -> Exit
     if arguments.test {
         arguments.rounds = 1;
     }
-    let name = std::env::args().next().unwrap_or_default();
-    let name = Path::new(&name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    println!("{name}: {}; {} rounds", Machine::this(), arguments.rounds);
+    let name = env!("CARGO_CRATE_NAME");
+    println!("{name}: {}; rounds: {}", Machine::this(), arguments.rounds);
     match bench(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
