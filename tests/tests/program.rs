@@ -178,7 +178,7 @@ fn bad_experiments() {
     refused(&["experiment", "all", "--nonsense", "--out", out], "--nonsense");
     refused(&["experiment", "all", "more", "--out", out], "more");
     refused(&["experiment", "all"], "--out");
-    refused(&["experiment", "--out", out], "scalability|load-balance");
+    refused(&["experiment", "--out", out], "WHICH");
     assert!(!Path::new(out).exists());
 }
 
