@@ -44,7 +44,8 @@ pub const FRAMES_PER_BLOCKING: u64 = 16;
 const OBJECTS_PER_BLOCK: usize = 16;
 /// Objects a block where there are so many that [`BLOCKS`] would not do.
 const OBJECTS_PER_LARGE_BLOCK: usize = 40;
-/// The number of blocks up to which they hold [`OBJECTS_PER_BLOCK`] objects.
+/// The number of blocks up to which they hold [`OBJECTS_PER_BLOCK`] objects, and of objects up to which
+/// blocks hold one.
 const BLOCKS: usize = 64;
 /// The fewest blocks for each worker.
 const BLOCKS_PER_WORKER: usize = 4;
@@ -172,8 +173,12 @@ fn kind(object: &Object) -> usize {
     }
 }
 
-/// The number of blocks for so many objects.
+/// The number of blocks for so many objects. Where there are few, each is a block of its own: few
+/// objects are heavy or uneven ones, and blocks of them would be too.
 fn block_count(objects: usize, workers: usize) -> usize {
+    if objects <= BLOCKS {
+        return objects;
+    }
     let few = objects.div_ceil(OBJECTS_PER_BLOCK).min(BLOCKS);
     let wanted = few.max(BLOCKS_PER_WORKER * workers).max(objects / OBJECTS_PER_LARGE_BLOCK);
     wanted.min(objects)

@@ -19,9 +19,15 @@ fn blocks(objects: Vec<Object>, grain: Grain, workers: usize) -> Vec<Block> {
 #[test]
 fn number_and_size_of_blocks() {
     // Particles, workers, blocks of particles; one block of walls comes on top.
-    for (objects, workers, expected) in
-        [(1, 4, 1), (10, 1, 4), (300, 1, 19), (300, 8, 32), (1_000, 2, 63), (4_000, 2, 100)]
-    {
+    for (objects, workers, expected) in [
+        (1, 4, 1),
+        (10, 1, 10),
+        (100, 1, 7),
+        (300, 1, 19),
+        (300, 8, 32),
+        (1_000, 2, 63),
+        (4_000, 2, 100),
+    ] {
         let blocks = blocks(particles(objects, false, true).objects, Grain::Spatial, workers);
         assert_eq!(blocks.len(), expected + 1, "{objects} particles, {workers} workers");
         let sizes = blocks[..expected].iter().map(|block| block.objects().len());
