@@ -9,7 +9,7 @@ use crate::inbox::{From, Rejected};
 use crate::probe::NoProbe;
 use crate::stage::{Stage, Stages};
 use crate::storage::Memory;
-use crate::sync::site;
+use crate::sync::{Atomic, site};
 use crate::tables::Tables;
 use crate::token::{Token, TokenOffice};
 use crate::unit::{InteractionId, UnitId, Work};
@@ -54,6 +54,8 @@ pub struct Pipeline<'m, E: Environment, W: Waiting = Spin> {
     pub(crate) arrivals: Arrivals,
     pub(crate) office: TokenOffice,
     pub(crate) config: Config,
+    /// Workers that ever joined.
+    pub(crate) joined: Atomic,
 }
 
 impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
@@ -70,6 +72,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
             arrivals: Arrivals::new(),
             office: TokenOffice::new(config.tokens),
             config,
+            joined: Atomic::new(0),
             tables,
         })
     }

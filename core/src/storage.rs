@@ -21,6 +21,8 @@ pub struct UnitSlot<O> {
     /// The frame of the unit's next update.
     pub(crate) frame: Atomic,
     pub(crate) arrival: Arrival,
+    /// The worker that updated it last, in whose core's cache it is.
+    pub(crate) home: Atomic,
     /// First of this frame's candidates.
     pub(crate) candidates: Atomic,
     /// First of the modelled interactions.
@@ -41,6 +43,7 @@ impl<O> UnitSlot<O> {
                 pending: Countdown::new(0),
                 frame: Atomic::new(0),
                 arrival: Arrival::new(),
+                home: Atomic::new(NONE),
                 candidates: Atomic::new(NONE),
                 modelled: Atomic::new(NONE),
                 inbox: Inbox::new(),

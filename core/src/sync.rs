@@ -143,6 +143,8 @@ sites! {
     DISPLAY_ADVANCE = Release;
     /// Acquire: pairs with `DISPLAY_ADVANCE`.
     DISPLAY_LOAD = Acquire;
+    /// Relaxed: a hint, by which updates find back to the core that did the last one.
+    HOME = Relaxed;
     /// Relaxed: a hint. Who misses it carries on with what it has, and looks again at its next step.
     HUNGRY = Relaxed;
     /// Relaxed: a sleeper announces itself before `FENCE_SLEEP`.

@@ -59,6 +59,7 @@ impl<'m, E: Environment> Tables<'m, E> {
             unit.frame.store(0, site::EXCLUSIVE);
             unit.candidates.store(NONE, site::EXCLUSIVE);
             unit.modelled.store(NONE, site::EXCLUSIVE);
+            unit.home.store(NONE, site::EXCLUSIVE);
             unit.inbox = crate::inbox::Inbox::new();
             // No rendering precedes the first update: it waits for the frame's opening only.
             unit.pending.arm(1);

@@ -10,7 +10,7 @@ use crate::probe::{NoProbe, Probe};
 use crate::stage::{Stage, Stages};
 use crate::sync::{fence, site};
 use crate::token::Token;
-use crate::unit::Work;
+use crate::unit::{NONE, UnitId, Work};
 use crate::wait::{Spin, Waiting};
 
 /// What a step did.
@@ -51,6 +51,8 @@ struct Carry<'p, 'm, E: Environment, W: Waiting> {
     renders: u32,
     /// Whether this worker is counted among the hungry.
     hungry: bool,
+    /// This worker's, among all that ever joined.
+    number: u32,
 }
 
 impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
@@ -68,6 +70,14 @@ impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
             self.shed();
             self.announce();
         }
+    }
+
+    /// Whether another worker updated `unit` last: its core has the unit in its cache, and is to have
+    /// it again if it comes for it in time.
+    #[inline]
+    fn is_at_home_elsewhere(&self, unit: UnitId) -> bool {
+        let home = self.pipeline.tables.unit(unit).home.load(site::HOME);
+        home != self.number && home != NONE
     }
 
     /// Counts this worker among the hungry, or not.
@@ -103,6 +113,10 @@ impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
 impl<E: Environment, W: Waiting> Outputs for Carry<'_, '_, E, W> {
     #[inline]
     fn emit(&mut self, work: Work) {
+        if matches!(work, Work::Update(unit) if self.is_at_home_elsewhere(unit)) {
+            self.queue(work);
+            return;
+        }
         // One work unit is for this worker itself.
         let shared = !self.works.is_empty() && self.pipeline.bells.somebody_is_hungry();
         if shared || self.works.is_full() {
@@ -146,7 +160,9 @@ pub struct Worker<'p, 'm, E: Environment, W: Waiting = Spin, P: Probe = NoProbe>
 
 impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
     pub(crate) fn new(pipeline: &'p Pipeline<'m, E, W>, probe: P) -> Self {
-        let carry = Carry { pipeline, works: Vec::new(), queued: 0, renders: 0, hungry: false };
+        let number = pipeline.joined.fetch_add(1, site::HOME);
+        let carry =
+            Carry { pipeline, works: Vec::new(), queued: 0, renders: 0, hungry: false, number };
         Self { carry, stage: Stage::BroadPhase, token: None, probe }
     }
 
@@ -207,6 +223,7 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
                 .map_err(<E::Error as From<TableFull>>::from),
             (Work::Interact(id), _) => pipeline.interact(env, id, &mut self.carry),
             (Work::Update(unit), token) => {
+                pipeline.tables.unit(unit).home.store(self.carry.number, site::HOME);
                 pipeline.update(env, unit, token.is_some(), &mut self.carry)
             }
             (Work::Render(unit), Some(token)) => pipeline.render(env, unit, token, &mut self.carry),
