@@ -247,3 +247,42 @@ impl<'a, C> Iterator for Segments<'a, '_, C> {
         Some(unsafe { ::core::slice::from_raw_parts(room.as_ptr().cast::<C>(), room.len()) })
     }
 }
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    /// What is read of `records` pushed with `ends`, segment by segment.
+    fn read_back(records: &[u8], ends: &[usize]) -> std::vec::Vec<std::vec::Vec<u8>> {
+        let contacts: [ContactSlot<u8>; 16] = [const { ContactSlot::new() }; 16];
+        let segments = [const { SegmentSlot::new() }; 16];
+        let pools = Pools::new(&contacts, &segments);
+        let mut pushed = Contacts::new(&pools, Frame(1));
+        assert_eq!(pushed.push(&[9]), Ok(()));
+        assert_eq!(pushed.push_segments(records, ends), Ok(()));
+        // SAFETY: nothing is pushed and nothing is reset while the segments are read.
+        unsafe { pools.segments(pushed.first()) }.map(<[u8]>::to_vec).collect()
+    }
+
+    #[test]
+    fn segments_end_where_they_are_said_to() {
+        assert_eq!(read_back(&[1, 2, 3], &[1, 3]), [&[9][..], &[1], &[2, 3]]);
+        assert_eq!(read_back(&[1, 2, 3], &[2]), [&[9][..], &[1, 2]], "the rest is left out");
+        assert_eq!(read_back(&[1, 2, 3], &[0, 1, 1, 3]), [&[9][..], &[1], &[2, 3]]);
+        assert_eq!(read_back(&[1, 2, 3], &[2, 1, 3]), [&[9][..], &[1, 2], &[3]]);
+        assert_eq!(read_back(&[1, 2, 3], &[1, 99]), [&[9][..], &[1], &[2, 3]]);
+        assert_eq!(read_back(&[1], &[]), [&[9][..]]);
+        assert_eq!(read_back(&[], &[7]), [&[9][..]]);
+    }
+
+    #[test]
+    fn all_segments_fit_or_none() {
+        let contacts: [ContactSlot<u8>; 8] = [const { ContactSlot::new() }; 8];
+        let segments = [const { SegmentSlot::new() }; 8];
+        let pools = Pools::new(&contacts, &segments);
+        let mut pushed = Contacts::new(&pools, Frame(0));
+        let full = TableFull { table: Table::Contacts, capacity: 4, needed: 5 };
+        assert_eq!(pushed.push_segments(&[1, 2, 3, 4, 5], &[2, 5]), Err(full));
+        assert_eq!((pushed.first(), pools.used(Frame(0))), (NONE, 0));
+    }
+}

@@ -10,8 +10,7 @@ use dualframe_core::unit::Work;
 use crate::executor::StageSeconds;
 
 /// Counts the time from one change of stage to the next: acquiring work and doing it, as the paper
-/// measures (§7.2.2). The system's clock is read when the stage changes only: several times a work
-/// unit would be felt.
+/// measures (§7.2.2). The system's clock is read when the stage changes only.
 pub(super) struct StageClock {
     last: Instant,
     /// What the time is counted towards; `None` while there is nothing to do.
