@@ -160,15 +160,16 @@ impl<'m, E: Environment + ?Sized> Tables<'m, E> {
         }
     }
 
-    /// Brings `unit`'s candidates into pair order and returns the first. The caller has the unit
-    /// exclusively.
-    pub(crate) fn sort_candidates(&self, unit: UnitId) -> u32 {
+    /// Brings `unit`'s candidates into pair order. The caller has the unit exclusively.
+    pub(crate) fn sort_candidates(&self, unit: UnitId) {
+        let head = &self.unit(unit).candidates;
         let slot = |index| self.interaction(InteractionId(index));
-        list::sort(
-            self.unit(unit).candidates.load(site::CANDIDATE_HEAD),
+        let first = list::sort(
+            head.load(site::CANDIDATE_HEAD),
             |index| slot(index).next(Chain::Candidates, unit),
             |index, to| slot(index).set_next(Chain::Candidates, unit, to),
             |a, b| (slot(a).other(unit), a) < (slot(b).other(unit), b),
-        )
+        );
+        head.store(first, site::CANDIDATE_HEAD);
     }
 }
