@@ -10,11 +10,9 @@
 //!
 //! No state is half written: the CAS publishes, then anyone may help the end of the list on.
 
-use crossbeam_utils::CachePadded;
-
 use crate::frame::Frame;
 use crate::ring::QueueSlot;
-use crate::sync::{AtomicWord, site, spin_hint};
+use crate::sync::{AtomicWord, CachePadded, site, spin_hint};
 
 /// The frame's arrivals. A cell holds a unit's index and, in its lowest bit, the parity of the frame
 /// that the unit arrived in: every unit arrives in every frame, so a cell that is not yet written in

@@ -7,12 +7,11 @@
 
 use ::core::cell::UnsafeCell;
 use ::core::mem::MaybeUninit;
-
-use crossbeam_utils::CachePadded;
+use ::core::ops::Range;
 
 use crate::error::{Table, TableFull};
 use crate::frame::Frame;
-use crate::sync::{Atomic, Cell, const_fn, site};
+use crate::sync::{Atomic, CachePadded, Cell, const_fn, site};
 use crate::unit::NONE;
 
 /// Memory of one result record. Contiguous and unwatched by loom: the segment that covers it is
@@ -98,8 +97,34 @@ impl Room {
                 Err(found) => start = found,
             }
         }
+        Err(self.refuse(count, start, capacity, table))
+    }
+
+    /// Claims `count` slots, or as many as are left, and says what is missing.
+    pub(crate) fn claim_some(
+        &self,
+        count: u32,
+        capacity: u32,
+        table: Table,
+    ) -> (Range<u32>, Result<(), TableFull>) {
+        let mut start = self.used();
+        loop {
+            let taken = count.min(capacity - start);
+            match self.used.exchange(start, start + taken, site::POOL_CLAIM) {
+                Ok(_) if taken == count => return (start..start + taken, Ok(())),
+                Ok(_) => {
+                    let full = self.refuse(count - taken, start + taken, capacity, table);
+                    return (start..start + taken, Err(full));
+                }
+                Err(found) => start = found,
+            }
+        }
+    }
+
+    /// Notes that `count` slots were asked for in vain.
+    fn refuse(&self, count: u32, used: u32, capacity: u32, table: Table) -> TableFull {
         let refused = self.refused.fetch_add(count, site::POOL_CLAIM) as usize + count as usize;
-        Err(TableFull { table, capacity: capacity as usize, needed: start as usize + refused })
+        TableFull { table, capacity: capacity as usize, needed: used as usize + refused }
     }
 }
 

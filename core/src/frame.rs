@@ -1,9 +1,7 @@
 //! Frame tags and the window of two frames in flight (§5.5).
 
-use crossbeam_utils::CachePadded;
-
 use crate::countdown::Countdown;
-use crate::sync::{Atomic, site};
+use crate::sync::{Atomic, CachePadded, site};
 
 /// A frame's number. It wraps after 2^32 frames; only equality, parity and the distance of
 /// neighbouring frames are ever used, so that wrapping is harmless.

@@ -87,22 +87,14 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         if others.is_empty() {
             return Ok(());
         }
-        let frame = self.next_frame(unit);
-        let ids = match self.tables.claim_candidates(others.len() as u32, frame) {
-            Ok(ids) => ids,
-            // Some may fit.
-            Err(_) if others.len() > 1 => {
-                let one_by_one = others.iter().map(|other| self.found(unit, &[*other], out));
-                return one_by_one.fold(Ok(()), |all, one| one.and(all));
-            }
-            Err(full) => return Err(full),
-        };
+        let (ids, outcome) =
+            self.tables.claim_candidates(others.len() as u32, self.next_frame(unit));
         let ids: Batch<InteractionId> = ids.collect();
         for (&id, &other) in ids.iter().zip(others) {
             self.tables.interaction(id).join([unit.min(other), unit.max(other)]);
         }
         self.candidates(unit, &ids, out);
-        Ok(())
+        outcome
     }
 
     /// Arrives at every modelled interaction of `unit` and tests those whose other end is there.

@@ -8,9 +8,7 @@
 //! Every index is in at most one place at a time, so a ring with a slot for every index is never
 //! full, and push cannot fail.
 
-use crossbeam_utils::CachePadded;
-
-use crate::sync::{AtomicWord, const_fn, site, spin_hint};
+use crate::sync::{AtomicWord, CachePadded, const_fn, site, spin_hint};
 
 /// Memory of one slot of a queue, or of the list of arrivals.
 #[derive(Debug)]

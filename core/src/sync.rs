@@ -24,6 +24,30 @@ macro_rules! const_fn {
 }
 pub(crate) use const_fn;
 
+#[cfg(not(loom))]
+pub(crate) use crossbeam_utils::CachePadded;
+
+/// No padding: loom's stacks are small, and it knows no cache lines.
+#[cfg(loom)]
+#[derive(Debug)]
+pub(crate) struct CachePadded<T>(T);
+
+#[cfg(loom)]
+impl<T> CachePadded<T> {
+    pub(crate) fn new(value: T) -> Self {
+        Self(value)
+    }
+}
+
+#[cfg(loom)]
+impl<T> ::core::ops::Deref for CachePadded<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.0
+    }
+}
+
 /// A named atomic access and its memory order.
 #[derive(Clone, Copy, Debug)]
 pub struct Site {

@@ -13,7 +13,11 @@ use crate::sync::site;
 use crate::unit::{InteractionId, NONE, UnitId};
 
 /// The most homes that units are shared out to; workers beyond their number share them.
+#[cfg(not(loom))]
 pub const MOST_HOMES: usize = 16;
+/// As many as models use: loom's stacks are small.
+#[cfg(loom)]
+pub const MOST_HOMES: usize = 2;
 
 /// The queues of the units of one home.
 #[derive(Debug)]
@@ -203,16 +207,18 @@ impl<'m, E: Environment + ?Sized> Tables<'m, E> {
         &self.interactions[id.index()]
     }
 
-    /// Slots for `count` pairs found in `frame`, or none: even frames have the first half of all slots.
+    /// Slots for `count` pairs found in `frame`, or for as many as fit: even frames have the first half
+    /// of all slots.
     pub(crate) fn claim_candidates(
         &self,
         count: u32,
         frame: Frame,
-    ) -> Result<impl Iterator<Item = InteractionId> + use<E>, TableFull> {
+    ) -> (impl Iterator<Item = InteractionId> + use<E>, Result<(), TableFull>) {
         let half = (self.interactions.len() / 2) as u32;
-        let claimed = self.found[frame.parity()].claim(count, half, Table::Interactions)?;
-        let first = claimed + frame.parity() as u32 * half;
-        Ok((first..first + count).map(InteractionId))
+        let room = &self.found[frame.parity()];
+        let (claimed, outcome) = room.claim_some(count, half, Table::Interactions);
+        let first = frame.parity() as u32 * half;
+        (claimed.map(move |place| InteractionId(first + place)), outcome)
     }
 
     /// Candidate slots that `frame` has claimed so far.

@@ -5,9 +5,7 @@
 //! announces itself, fences, and looks for work again; a worker that queued work fences and looks
 //! for sleepers. Of two fences one is first, so one of the two sees the other.
 
-use crossbeam_utils::CachePadded;
-
-use crate::sync::{Atomic, fence, site};
+use crate::sync::{Atomic, CachePadded, fence, site};
 
 /// How a host's workers sleep and are woken.
 pub trait Waiting: Sync {
