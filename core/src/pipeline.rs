@@ -88,7 +88,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         if frames > 0 {
             self.window.limit = Frame(self.window.limit.0.wrapping_add(frames));
             let units = 0..self.tables.units.len() as u32;
-            units.for_each(|unit| self.tables.queues.enter.push(unit));
+            units.for_each(|unit| self.push(Work::Enter(UnitId(unit))));
         }
         Ok(())
     }
@@ -125,10 +125,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     /// interface. It is processed by `to`'s first update in a later frame than the one now open.
     ///
     /// # Errors
-    /// [`Rejected`] with the message if all letters are under way.
-    ///
-    /// # Panics
-    /// If there is no unit `to`.
+    /// [`Rejected`] with the message if all letters are under way, or if there is no unit `to`.
     pub fn post(
         &self,
         to: UnitId,
@@ -136,7 +133,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         message: E::Message,
     ) -> Result<(), Rejected<E::Message>> {
         let stamp = self.window.open();
-        self.tables.post.post(&self.tables.unit(to).inbox, stamp, from, message)
+        self.tables.post(to, stamp, from, message)
     }
 
     /// Takes every letter that waits in an inbox, in order for each unit: to post them anew where
@@ -205,7 +202,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         if self.rendered_frame(unit) == display {
             return Some(Work::Render(unit));
         }
-        queue.push(unit.0);
+        self.push(Work::Render(unit));
         None
     }
 
@@ -213,12 +210,14 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     #[inline]
     pub(crate) fn push(&self, work: Work) {
         let queues = &self.tables.queues;
-        match work {
-            Work::Enter(unit) => queues.enter.push(unit.0),
-            Work::Interact(id) => queues.interact.push(id.0),
-            Work::Update(unit) => queues.update.push(unit.0),
-            Work::Render(unit) => queues.render[self.rendered_frame(unit).parity()].push(unit.0),
-        }
+        let (queue, index) = match work {
+            Work::Enter(unit) => (&queues.enter, unit.0),
+            Work::Interact(id) => (&queues.interact, id.0),
+            Work::Update(unit) => (&queues.update, unit.0),
+            Work::Render(unit) => (&queues.render[self.rendered_frame(unit).parity()], unit.0),
+        };
+        // A queue has a slot for every index of its table.
+        let _fits = queue.push(index);
     }
 
     /// The frame of the unit's next update.

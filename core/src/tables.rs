@@ -4,10 +4,10 @@ use crate::contacts::{Pools, Room};
 use crate::environment::Environment;
 use crate::error::{SetupError, Table, TableFull};
 use crate::frame::Frame;
-use crate::inbox::Post;
+use crate::inbox::{From, Post, Rejected};
 use crate::list;
 use crate::ring::{IndexRing, QueueSlot, slots_for};
-use crate::storage::{Chain, InteractionSlot, Memory, UnitSlot, queue_slots};
+use crate::storage::{Chain, InteractionSlot, Memory, UnitSlot, at, queue_slots};
 use crate::sync::site;
 use crate::unit::{InteractionId, NONE, UnitId};
 
@@ -69,23 +69,26 @@ impl<'m, E: Environment> Tables<'m, E> {
             link_modelled(units, interactions)?;
         }
         let mut rest = queues;
-        let mut ring = |indices| {
-            let (slots, others) = ::core::mem::take(&mut rest).split_at_mut(slots_for(indices));
+        let mut slots = |indices| -> &'m mut [QueueSlot] {
+            let (slots, others) = ::core::mem::take(&mut rest)
+                .split_at_mut_checked(slots_for(indices))
+                .unwrap_or_default();
             rest = others;
             slots
         };
+        let mut ring = |indices| IndexRing::new(slots(indices));
         let queues = Queues {
-            enter: IndexRing::new(ring(units.len())),
-            interact: IndexRing::new(ring(interactions.len())),
-            update: IndexRing::new(ring(units.len())),
-            render: [IndexRing::new(ring(units.len())), IndexRing::new(ring(units.len()))],
+            enter: ring(units.len())?,
+            interact: ring(interactions.len())?,
+            update: ring(units.len())?,
+            render: [ring(units.len())?, ring(units.len())?],
         };
-        let free: &'m mut [QueueSlot] = ring(letters.len());
+        let post = Post::new(letters, slots(letters.len()))?;
         Ok(Self {
             units,
             interactions,
             pools: Pools::new(contacts, segments),
-            post: Post::new(letters, free),
+            post,
             queues,
             found: [Room::new(), Room::new()],
         })
@@ -118,14 +121,34 @@ fn link_modelled<O, I>(
 }
 
 impl<'m, E: Environment + ?Sized> Tables<'m, E> {
+    /// A unit that the protocol names; not one that a host names.
     #[inline]
     pub(crate) fn unit(&self, unit: UnitId) -> &UnitSlot<E::Object> {
-        &self.units[unit.index()]
+        // SAFETY: what travels was counted up to the number of units (PROTOCOL.md §9).
+        unsafe { at(self.units, unit.index()) }
     }
 
+    /// An interaction that the protocol names.
     #[inline]
     pub(crate) fn interaction(&self, id: InteractionId) -> &InteractionSlot<E::Interaction> {
-        &self.interactions[id.index()]
+        // SAFETY: what travels was counted up to the number of slots (PROTOCOL.md §9).
+        unsafe { at(self.interactions, id.index()) }
+    }
+
+    /// Posts `message` to a unit that a host names.
+    pub(crate) fn post(
+        &self,
+        to: UnitId,
+        stamp: Frame,
+        from: From,
+        message: E::Message,
+    ) -> Result<(), Rejected<E::Message>> {
+        let Some(unit) = self.units.get(to.index()) else {
+            let (capacity, needed) = (self.units.len(), to.index().saturating_add(1));
+            let full = TableFull { table: Table::Units, capacity, needed };
+            return Err(Rejected { message, full });
+        };
+        self.post.post(&unit.inbox, stamp, from, message)
     }
 
     /// A slot for a pair found in `frame`: even frames have the first half of the slots.
