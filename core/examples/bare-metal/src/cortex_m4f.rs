@@ -1,62 +1,53 @@
 //! One Cortex-M4F of QEMU's `mps2-an386` machine. The one core is the pipeline's one worker; SysTick
 //! interrupts it wherever it is, inside the pipeline's own queues too, and posts letters for
-//! all senders in turn. A lock there would never be released: the core has none.
+//! all senders in turn. A lock there would never be released; the core has none.
 
 use core::fmt::{Display, Write};
-use core::mem::MaybeUninit;
-use core::sync::atomic::{AtomicPtr, Ordering};
 
-use cortex_m::peripheral::Peripherals;
+use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::{entry, exception};
 use cortex_m_semihosting::{debug, hio};
-use dualframe_core::pipeline::{Config, Pipeline};
-use dualframe_core::storage::Static;
+use dualframe_core::wait::Spin;
 
+use crate::bare::{Place, is_good};
 use crate::mail::{Outbox, SENDERS};
-use crate::run::{Report, Tables, work};
-use crate::ve::{FRAMES, Picture, Room};
+use crate::run::{Report, work};
+use crate::ve::{Fault, Picture};
 
 /// Clock cycles between two interrupts: half a millisecond at 25 MHz.
 const TICK: u32 = 12_500;
 
-static TABLES: Static<Tables> = Static::new(Tables::new());
-static PIPELINE: Static<MaybeUninit<Pipeline<'static, Room>>> = Static::new(MaybeUninit::uninit());
-/// The pipeline, once it runs; null before.
-static RUNNING: AtomicPtr<Pipeline<'static, Room>> = AtomicPtr::new(core::ptr::null_mut());
+/// One worker that holds the token sees all work: it never waits for another.
+static PLACE: Place<Spin> = Place::new();
 static OUTBOX: Outbox = Outbox::new();
 
 #[entry]
 fn start() -> ! {
     match run() {
-        Ok(picture) => {
-            let (picture, steps) = picture;
+        Ok((steps, picture)) => {
             let report = Report { picture, steps: &[steps] };
-            exit(&report, report.is_sound())
+            exit(&report, is_good(&report))
         }
-        Err(message) => exit(message, false),
+        Err(fault) => exit(fault, false),
     }
 }
 
-fn run() -> Result<(Picture, u32), &'static str> {
-    let (tables, place) = TABLES.take().zip(PIPELINE.take()).ok_or("memory was taken already")?;
-    // One worker with the token sees all work, so that it never waits but for letters.
-    let pipeline = Pipeline::new(tables.lend(), Config::default(), dualframe_core::wait::Spin);
-    let pipeline = place.write(pipeline.map_err(|_| "memory that does not fit")?);
-    pipeline.run(FRAMES).map_err(|_| "frames that still run")?;
-    let pipeline = &*pipeline;
-    // Release: whoever finds the pipeline finds it built.
-    RUNNING.store(core::ptr::from_ref(pipeline).cast_mut(), Ordering::Release);
-    let mut timer = Peripherals::take().ok_or("peripherals were taken already")?.SYST;
+fn run() -> Result<(u32, Picture), Fault> {
+    let pipeline = PLACE.start(Spin)?;
+    let token = pipeline.token(Picture::EMPTY).map_err(|(_, full)| full)?;
+    let mut timer = cortex_m::Peripherals::take().ok_or(Fault::Started)?.SYST;
+    start_timer(&mut timer);
+    let (steps, picture) = work(pipeline, Some(token), &OUTBOX, sleep_unless)?;
+    Ok((steps, picture.unwrap_or(Picture::EMPTY)))
+}
+
+fn start_timer(timer: &mut SYST) {
     timer.set_clock_source(SystClkSource::Core);
     timer.set_reload(TICK - 1);
     timer.clear_current();
-    timer.enable_counter();
     timer.enable_interrupt();
-    let token = pipeline.token(Picture::EMPTY).map_err(|_| "no token")?;
-    let (steps, picture) =
-        work(pipeline, Some(token), &OUTBOX, sleep_unless).unwrap_or_else(|fault| exit(fault, false));
-    Ok((picture.ok_or("no picture")?, steps))
+    timer.enable_counter();
 }
 
 /// Sleeps until an interrupt, unless `look` says that there is no need. One that comes between the
@@ -71,10 +62,7 @@ fn sleep_unless(look: &dyn Fn() -> bool) {
 
 #[exception]
 fn SysTick() {
-    // Acquire: pairs with the Release in `run`.
-    let pipeline = RUNNING.load(Ordering::Acquire);
-    // SAFETY: `run` stores a reference that is never used exclusively again.
-    if let Some(pipeline) = unsafe { pipeline.as_ref() } {
+    if let Some(pipeline) = PLACE.running() {
         (0..SENDERS).for_each(|sender| OUTBOX.post_due(sender, pipeline));
     }
 }

@@ -12,107 +12,91 @@
 //! that epoch. Interrupts from several cores may merge into one; every sleeper that it reaches looks again.
 //!
 //! When all letters are posted the timers are off: from then on only another core ends a sleep, and
-//! a lost wake-up would hang the run.
+//! a core that nobody wakes would hang the run. (A run seldom meets the gap between look and WFI: the
+//! argument above is what says that it is closed.)
 
 mod machine;
 
-use core::mem::MaybeUninit;
-use core::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU32, Ordering};
 
-use dualframe_core::pipeline::{Config, Pipeline};
-use dualframe_core::storage::Static;
-use dualframe_core::token::Token;
 use dualframe_core::wait::{Bell, Epoch, Waiting};
 
-use self::machine::{CORES, Cause, core_number, exit};
+use self::machine::{CORES, Cause, core_number, exit, interrupt_others, sleep_unless, sleep_until};
+use crate::bare::{Place, is_good};
 use crate::mail::Outbox;
-use crate::run::{Report, Tables, work};
-use crate::ve::{FRAMES, Picture, Room};
+use crate::run::{Report, work};
+use crate::ve::{Fault, Picture};
 
-type Shared = Pipeline<'static, Room, Interrupts>;
-
-static TABLES: Static<Tables> = Static::new(Tables::new());
-static PIPELINE: Static<MaybeUninit<Shared>> = Static::new(MaybeUninit::uninit());
-/// The pipeline, once it runs; null before.
-static RUNNING: AtomicPtr<Shared> = AtomicPtr::new(core::ptr::null_mut());
+static PLACE: Place<Interrupts> = Place::new();
 static OUTBOX: Outbox = Outbox::new();
 /// Steps of each core, once it is done; then counted in `DONE`.
 static STEPS: [AtomicU32; CORES] = [const { AtomicU32::new(0) }; CORES];
 static DONE: AtomicU32 = AtomicU32::new(0);
+/// Cores that are ready to work.
+static READY: AtomicU32 = AtomicU32::new(0);
 
 /// Sleeps in WFI, wakes by interrupts between cores.
 struct Interrupts;
 
 impl Waiting for Interrupts {
     fn sleep(&self, bell: &Bell, seen: Epoch) {
-        while !bell.rung_since(seen) {
-            machine::sleep_unless(&|| bell.rung_since(seen));
-        }
+        sleep_until(&|| bell.rung_since(seen));
     }
 
     /// Wakes every other core: who sleeps is not known, and who listens to the other bell looks and
     /// sleeps on.
     fn wake(&self, _: &Bell, _: u32) {
-        machine::interrupt_others();
+        interrupt_others();
     }
 }
 
-/// The pipeline, if it runs.
-fn running() -> Option<&'static Shared> {
-    // Acquire: pairs with the Release in `first`.
-    let pipeline = RUNNING.load(Ordering::Acquire);
-    // SAFETY: `first` stores a reference that is never used exclusively again.
-    unsafe { pipeline.as_ref() }
-}
-
-/// Core 0: builds the pipeline, calls the others, renders.
+/// Core 0: builds the pipeline, calls the others, renders, reports.
 fn first() -> ! {
-    let Some((tables, place)) = TABLES.take().zip(PIPELINE.take()) else {
-        exit("memory was taken already", false);
-    };
-    let pipeline = match Pipeline::new(tables.lend(), Config::default(), Interrupts) {
-        Ok(pipeline) => place.write(pipeline),
-        Err(error) => exit(error, false),
-    };
-    if let Err(error) = pipeline.run(FRAMES) {
-        exit(error, false);
-    }
-    let pipeline = &*pipeline;
-    // Release: whoever finds the pipeline finds it built.
-    RUNNING.store(core::ptr::from_ref(pipeline).cast_mut(), Ordering::Release);
-    machine::interrupt_others();
-    let Ok(token) = pipeline.token(Picture::EMPTY) else { exit("no token", false) };
-    let picture = take_part(pipeline, Some(token));
-    // Acquire: pairs with the Release in `take_part`.
-    machine::sleep_until(&|| DONE.load(Ordering::Acquire) == CORES as u32);
-    let steps = STEPS.each_ref().map(|steps| steps.load(Ordering::Relaxed));
-    let report = Report { picture: picture.unwrap_or(Picture::EMPTY), steps: &steps };
-    exit(&report, report.is_sound())
-}
-
-/// Every other core: waits to be called, then works.
-fn other() -> ! {
-    machine::sleep_until(&|| running().is_some());
-    if let Some(pipeline) = running() {
-        take_part(pipeline, None);
-    }
-    machine::sleep_until(&|| false);
-    unreachable!("a condition that never holds")
-}
-
-/// What every core does until all frames are swapped.
-fn take_part(pipeline: &Shared, token: Option<Token<'_, Picture>>) -> Option<Picture> {
-    machine::start_timer();
-    match work(pipeline, token, &OUTBOX, machine::sleep_unless) {
-        Ok((steps, picture)) => {
-            STEPS[core_number()].store(steps, Ordering::Relaxed);
-            // Release: publishes the steps to core 0.
-            DONE.fetch_add(1, Ordering::Release);
-            machine::interrupt_others();
-            picture
+    match lead() {
+        Ok(picture) => {
+            let steps = STEPS.each_ref().map(|steps| steps.load(Ordering::Relaxed));
+            let report = Report { picture, steps: &steps };
+            exit(&report, is_good(&report))
         }
         Err(fault) => exit(fault, false),
     }
+}
+
+fn lead() -> Result<Picture, Fault> {
+    let pipeline = PLACE.start(Interrupts)?;
+    interrupt_others();
+    // Relaxed: nothing but the number is read.
+    sleep_until(&|| READY.load(Ordering::Relaxed) == CORES as u32 - 1);
+    let token = pipeline.token(Picture::EMPTY).map_err(|(_, full)| full)?;
+    machine::start_timer();
+    let (steps, picture) = work(pipeline, Some(token), &OUTBOX, sleep_unless)?;
+    done(steps);
+    // Acquire: pairs with the Release in `done`.
+    sleep_until(&|| DONE.load(Ordering::Acquire) == CORES as u32);
+    Ok(picture.unwrap_or(Picture::EMPTY))
+}
+
+/// Every other core: waits to be called, works.
+fn other() -> ! {
+    sleep_until(&|| PLACE.running().is_some());
+    // Relaxed: as in `lead`.
+    READY.fetch_add(1, Ordering::Relaxed);
+    interrupt_others();
+    machine::start_timer();
+    match PLACE.running().map(|pipeline| work(pipeline, None, &OUTBOX, sleep_unless)) {
+        Some(Err(fault)) => exit(fault, false),
+        Some(Ok((steps, _))) => done(steps),
+        None => {}
+    }
+    machine::sleep_for_ever()
+}
+
+/// Says that this core has left.
+fn done(steps: u32) {
+    STEPS[core_number()].store(steps, Ordering::Relaxed);
+    // Release: publishes the steps to core 0.
+    DONE.fetch_add(1, Ordering::Release);
+    interrupt_others();
 }
 
 /// What an interrupt does on the core that takes it.
@@ -121,7 +105,7 @@ fn interrupted(cause: Cause) {
         // It has ended a sleep, if there was one.
         Cause::OtherCore => {}
         Cause::Timer => {
-            if let Some(pipeline) = running() {
+            if let Some(pipeline) = PLACE.running() {
                 OUTBOX.post_due(core_number(), pipeline);
             }
             if OUTBOX.is_done() {
@@ -133,7 +117,6 @@ fn interrupted(cause: Cause) {
     }
 }
 
-/// Prints what it is given and ends the run.
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
     exit(info, false)

@@ -59,10 +59,10 @@ impl Outbox {
     /// Whether the token's holder, who alone lets frames pass, has to wait for letters before its
     /// next step, so that the last frame reads the last of them.
     ///
-    /// While the third frame from the end is on display, at most the last but one has been opened:
-    /// the last is opened by units that were all updated in the last but one, and so were all
-    /// rendered in the third from the end. So a letter posted now is stamped with the last
-    /// but one, at the latest, and read in the last.
+    /// While the holder waits with the third frame from the end on display, the last cannot be
+    /// opened: all units would have been updated in the last but one, for which all must be
+    /// rendered in the third from the end, and that would not be on display any more. So a letter
+    /// posted meanwhile is stamped with the last frame but one at the latest, and read in the last.
     pub(crate) fn holds_back<W: Waiting>(&self, pipeline: &Pipeline<'_, Room, W>) -> bool {
         pipeline.frame().0 + 3 >= FRAMES && !self.is_done()
     }

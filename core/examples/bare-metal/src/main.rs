@@ -7,6 +7,8 @@ mod mail;
 mod run;
 mod ve;
 
+#[cfg(target_os = "none")]
+mod bare;
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 mod cortex_m4f;
 #[cfg(all(target_arch = "riscv64", target_os = "none"))]

@@ -18,7 +18,7 @@ use core::fmt;
 
 use dualframe_core::contacts::Contacts;
 use dualframe_core::environment::{Environment, Pair};
-use dualframe_core::error::TableFull;
+use dualframe_core::error::{SetupError, StillRunning, TableFull};
 use dualframe_core::frame::Frame;
 use dualframe_core::inbox::From as Sender;
 use dualframe_core::inputs::Inputs;
@@ -77,11 +77,27 @@ pub(crate) enum Fault {
     Full(TableFull),
     /// A disc was to read another letter of this sender's.
     OutOfTurn(UnitId, Sender),
+    /// The pipeline does not fit its memory.
+    Setup(SetupError),
+    /// The run was to start a second time.
+    Started,
 }
 
 impl From<TableFull> for Fault {
     fn from(full: TableFull) -> Self {
         Self::Full(full)
+    }
+}
+
+impl From<SetupError> for Fault {
+    fn from(error: SetupError) -> Self {
+        Self::Setup(error)
+    }
+}
+
+impl From<StillRunning> for Fault {
+    fn from(_: StillRunning) -> Self {
+        Self::Started
     }
 }
 
@@ -93,6 +109,8 @@ impl fmt::Display for Fault {
                 let Sender { sender, sequence } = from;
                 write!(f, "{unit} got letter {sequence} of sender {sender} out of turn")
             }
+            Self::Setup(error) => error.fmt(f),
+            Self::Started => f.write_str("the run has started already"),
         }
     }
 }
@@ -133,9 +151,8 @@ impl Disc {
     pub(crate) fn advance(&mut self, pushes: impl Iterator<Item = [f32; 2]>) {
         let mut push = [0.0; 2];
         pushes.for_each(|one| push = [push[0] + one[0], push[1] + one[1]]);
-        for axis in 0..2 {
-            let (place, velocity) = (&mut self.place[axis], &mut self.velocity[axis]);
-            *velocity += push[axis] * STEP;
+        for ((place, velocity), push) in self.place.iter_mut().zip(&mut self.velocity).zip(push) {
+            *velocity += push * STEP;
             let leaves = if *velocity < 0.0 { *place < 0.0 } else { *place > SIDE };
             if leaves {
                 *velocity = -*velocity;
@@ -263,7 +280,13 @@ impl Environment for Room {
         Ok(())
     }
 
-    fn render(&self, unit: UnitId, _: Frame, disc: &Disc, picture: &mut Picture) -> Result<(), Fault> {
+    fn render(
+        &self,
+        unit: UnitId,
+        _: Frame,
+        disc: &Disc,
+        picture: &mut Picture,
+    ) -> Result<(), Fault> {
         picture.draw(unit.index(), disc);
         Ok(())
     }
