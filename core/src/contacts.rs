@@ -93,14 +93,15 @@ impl Room {
     #[inline]
     pub(crate) fn claim(&self, count: u32, capacity: u32, table: Table) -> Result<u32, TableFull> {
         let mut start = self.used();
-        while start as usize + count as usize <= capacity as usize {
+        while capacity.saturating_sub(start) >= count {
             match self.used.exchange(start, start + count, site::POOL_CLAIM) {
                 Ok(_) => return Ok(start),
                 Err(found) => start = found,
             }
         }
-        let refused = self.refused.fetch_add(count, site::POOL_CLAIM) as usize + count as usize;
-        Err(TableFull { table, capacity: capacity as usize, needed: start as usize + refused })
+        let refused = self.refused.fetch_add(count, site::POOL_CLAIM) as usize;
+        let needed = (start as usize).saturating_add(refused).saturating_add(count as usize);
+        Err(TableFull { table, capacity: capacity as usize, needed })
     }
 }
 

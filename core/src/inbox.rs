@@ -84,7 +84,7 @@ impl Default for Inbox {
     }
 }
 
-/// The pool of letters that a pipeline's inboxes share.
+/// The pool of letters that a pipeline's inboxes share. An inbox stays with one pool.
 #[derive(Debug)]
 pub struct Post<'m, M> {
     slots: &'m [LetterSlot<M>],
