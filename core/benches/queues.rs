@@ -53,11 +53,11 @@ impl Queue for Core {
     fn new() -> Self {
         // Leaked: a ring borrows its memory, and a benchmark ends soon.
         let slots: Vec<_> = (0..SLOTS).map(|_| QueueSlot::new()).collect();
-        Self(IndexRing::new(slots.leak()))
+        Self(IndexRing::new(slots.leak()).expect("slots"))
     }
 
     fn push(&self, index: u32) {
-        self.0.push(index);
+        self.0.push(index).expect("an index below the slots");
     }
 
     fn pop(&self) -> Option<u32> {

@@ -11,6 +11,7 @@ use ::core::ops::Range;
 
 use crate::error::{Table, TableFull};
 use crate::frame::Frame;
+use crate::storage::at;
 use crate::sync::{Atomic, CachePadded, Cell, const_fn, site};
 use crate::unit::NONE;
 
@@ -91,7 +92,7 @@ impl Room {
     #[inline]
     pub(crate) fn claim(&self, count: u32, capacity: u32, table: Table) -> Result<u32, TableFull> {
         let mut start = self.used();
-        while start as usize + count as usize <= capacity as usize {
+        while capacity.saturating_sub(start) >= count {
             match self.used.exchange(start, start + count, site::POOL_CLAIM) {
                 Ok(_) => return Ok(start),
                 Err(found) => start = found,
@@ -123,8 +124,9 @@ impl Room {
 
     /// Notes that `count` slots were asked for in vain.
     fn refuse(&self, count: u32, used: u32, capacity: u32, table: Table) -> TableFull {
-        let refused = self.refused.fetch_add(count, site::POOL_CLAIM) as usize + count as usize;
-        TableFull { table, capacity: capacity as usize, needed: used as usize + refused }
+        let refused = self.refused.fetch_add(count, site::POOL_CLAIM) as usize;
+        let needed = (used as usize).saturating_add(refused).saturating_add(count as usize);
+        TableFull { table, capacity: capacity as usize, needed }
     }
 }
 
@@ -141,7 +143,8 @@ pub(crate) struct Pools<'m, C> {
 impl<'m, C: Copy> Pools<'m, C> {
     pub(crate) fn new(contacts: &'m [ContactSlot<C>], segments: &'m [SegmentSlot]) -> Self {
         let rooms = [Room::new(), Room::new()];
-        Self { contacts, segments, rooms, half: (contacts.len() / 2) as u32 }
+        let half = (contacts.len().min(segments.len()) / 2) as u32;
+        Self { contacts, segments, rooms, half }
     }
 
     /// Empties `frame`'s pool.
@@ -160,11 +163,11 @@ impl<'m, C: Copy> Pools<'m, C> {
         let length = u32::try_from(records.len()).unwrap_or(u32::MAX);
         let claimed = self.rooms[frame.parity()].claim(length, self.half, Table::Contacts)?;
         let start = claimed + frame.parity() as u32 * self.half;
-        let room = &self.contacts[start as usize..start as usize + records.len()];
-        // SAFETY: `claim` gave this range to this call alone, until `reset`, which happens after
-        // the last reader; the slots are contiguous and `transparent`.
+        // SAFETY: `claim` gave this range, which is within the frame's half, to this call alone, until
+        // `reset`, which happens after the last reader; the slots are contiguous and `transparent`.
         unsafe {
-            let first = UnsafeCell::raw_get(room.as_ptr().cast::<UnsafeCell<MaybeUninit<C>>>());
+            let room = self.contacts.as_ptr().add(start as usize);
+            let first = UnsafeCell::raw_get(room.cast::<UnsafeCell<MaybeUninit<C>>>());
             ::core::ptr::copy_nonoverlapping(records.as_ptr(), first.cast::<C>(), records.len());
         }
         Ok(start)
@@ -173,8 +176,8 @@ impl<'m, C: Copy> Pools<'m, C> {
     /// The records of the interaction whose first segment is `first`.
     ///
     /// # Safety
-    /// The interaction is done and this frame's pool has not been reset, for as long as the
-    /// iterator and what it yields live.
+    /// `first` is the interaction's [`Contacts::first`], the interaction is done, and this frame's
+    /// pool has not been reset, for as long as the iterator and what it yields live.
     pub(crate) unsafe fn segments<'a>(&'a self, first: u32) -> Segments<'a, 'm, C> {
         Segments { pools: self, next: first }
     }
@@ -214,14 +217,15 @@ impl<'a, 'm, C: Copy> Contacts<'a, 'm, C> {
     /// # Errors
     /// [`TableFull`] if the frame's pool has no room for all of them; nothing is written then.
     pub fn push_segments(&mut self, records: &[C], ends: &[usize]) -> Result<(), TableFull> {
-        let total = ends.last().map_or(0, |&end| end.min(records.len()));
+        let records = ends.last().map_or(&[][..], |&end| records.get(..end).unwrap_or(records));
+        let total = records.len();
         if total == 0 {
             return Ok(());
         }
-        let base = self.pools.write(self.frame, &records[..total])?;
+        let base = self.pools.write(self.frame, records)?;
         let mut start = 0;
         for &end in ends {
-            let end = end.clamp(start, total);
+            let end = end.min(total).max(start);
             if end > start {
                 self.append(base + start as u32, (end - start) as u32);
             }
@@ -233,15 +237,19 @@ impl<'a, 'm, C: Copy> Contacts<'a, 'm, C> {
     /// Marks `length` records from `segment` on, which were just claimed, as the next segment.
     #[inline]
     fn append(&mut self, segment: u32, length: u32) {
-        let header = &self.pools.segments[segment as usize].0;
         // SAFETY: the header belongs to the range just claimed.
-        unsafe { header.with_mut(|header| *header = Header { length, next: NONE }) };
+        unsafe {
+            let header = &at(self.pools.segments, segment as usize).0;
+            header.with_mut(|header| *header = Header { length, next: NONE });
+        }
         if self.last == NONE {
             self.first = segment;
         } else {
-            let last = &self.pools.segments[self.last as usize].0;
             // SAFETY: `last` was claimed by this interaction, whose results nobody reads yet.
-            unsafe { last.with_mut(|header| header.next = segment) };
+            unsafe {
+                let last = &at(self.pools.segments, self.last as usize).0;
+                last.with_mut(|header| header.next = segment);
+            }
         }
         self.last = segment;
     }
@@ -263,13 +271,16 @@ impl<'a, C> Iterator for Segments<'a, '_, C> {
             return None;
         }
         let start = self.next as usize;
-        // SAFETY: the interaction is done (`Pools::segments`), so nobody writes its headers.
-        let header = unsafe { self.pools.segments[start].0.with(|header| *header) };
+        // SAFETY: a segment of the interaction's, which is done (`Pools::segments`), so that nobody
+        // writes its headers.
+        let header = unsafe { at(self.pools.segments, start).0.with(|header| *header) };
         self.next = header.next;
-        let room = &self.pools.contacts[start..start + header.length as usize];
         // SAFETY: `write` initialised the range before the header was written; it is not written
         // again while this frame's results are read.
-        Some(unsafe { ::core::slice::from_raw_parts(room.as_ptr().cast::<C>(), room.len()) })
+        Some(unsafe {
+            let first = self.pools.contacts.as_ptr().add(start).cast::<C>();
+            ::core::slice::from_raw_parts(first, header.length as usize)
+        })
     }
 }
 

@@ -84,7 +84,7 @@ impl Default for Inbox {
     }
 }
 
-/// The pool of letters that a pipeline's inboxes share.
+/// The pool of letters that a pipeline's inboxes share. An inbox stays with one pool.
 #[derive(Debug)]
 pub struct Post<'m, M> {
     slots: &'m [LetterSlot<M>],
@@ -95,15 +95,18 @@ impl<'m, M: Send + Sync> Post<'m, M> {
     /// A pool of as many letters as there are `slots`; `queue` holds the free ones and must have
     /// [`crate::ring::slots_for`] of them.
     ///
-    /// # Panics
-    /// If `queue` is too short.
-    pub fn new(slots: &'m mut [LetterSlot<M>], queue: &'m mut [QueueSlot]) -> Self {
-        let free = IndexRing::new(queue);
+    /// # Errors
+    /// [`TableFull`] if `queue` is too short.
+    pub fn new(
+        slots: &'m mut [LetterSlot<M>],
+        queue: &'m mut [QueueSlot],
+    ) -> Result<Self, TableFull> {
+        let free = IndexRing::new(queue)?;
         for (index, slot) in slots.iter_mut().enumerate() {
             *slot.message.get_mut() = None;
-            free.push(index as u32);
+            free.push(index as u32)?;
         }
-        Self { slots, free }
+        Ok(Self { slots, free })
     }
 
     /// Posts `message` to `inbox` in frame `stamp`.
@@ -117,27 +120,31 @@ impl<'m, M: Send + Sync> Post<'m, M> {
         from: From,
         message: M,
     ) -> Result<(), Rejected<M>> {
-        let Some(index) = self.free.pop() else {
+        let free = self.free.pop();
+        let Some((index, slot)) = free.and_then(|index| Some((index, self.slot(index)?))) else {
             let capacity = self.slots.len();
             let full = TableFull { table: Table::Letters, capacity, needed: capacity + 1 };
             return Err(Rejected { message, full });
         };
-        let slot = &self.slots[index as usize];
         // SAFETY: the index came from the free ring, so the slot is this caller's alone until
         // `put` publishes it.
         unsafe { slot.message.with_mut(|place| *place = Some(message)) };
         slot.stamp.store(stamp.0, site::SLOT_FIELD);
         slot.sender.store(from.sender, site::SLOT_FIELD);
         slot.sequence.store(from.sequence, site::SLOT_FIELD);
-        self.put(inbox, index);
+        Self::put(inbox, index, slot);
         Ok(())
     }
 
-    fn put(&self, inbox: &Inbox, index: u32) {
-        let next = &self.slots[index as usize].next;
+    /// The letter of this index; `None` past the end of a list.
+    fn slot(&self, index: u32) -> Option<&'m LetterSlot<M>> {
+        self.slots.get(index as usize)
+    }
+
+    fn put(inbox: &Inbox, index: u32, slot: &LetterSlot<M>) {
         let mut newest = inbox.0.load(site::LIST_FOLLOW);
         loop {
-            next.store(newest, site::LIST_LINK);
+            slot.next.store(newest, site::LIST_LINK);
             match inbox.0.exchange(newest, index, site::MAIL_PUSH) {
                 Ok(_) => return,
                 Err(found) => newest = found,
@@ -153,23 +160,25 @@ impl<'m, M: Send + Sync> Post<'m, M> {
         }
         let mut rest = inbox.0.swap(NONE, site::MAIL_TAKE);
         let mut due = NONE;
-        while rest != NONE {
-            let slot = &self.slots[rest as usize];
+        while let Some(slot) = self.slot(rest) {
             let index = rest;
             rest = slot.next.load(site::LIST_FOLLOW);
             if Frame(slot.stamp.load(site::SLOT_FIELD)).is_before(frame) {
                 slot.next.store(due, site::LIST_LINK);
                 due = index;
             } else {
-                self.put(inbox, index);
+                Self::put(inbox, index, slot);
             }
         }
-        let slot = |index: u32| &self.slots[index as usize];
         let next = list::sort(
             due,
-            |index| slot(index).next.load(site::LIST_FOLLOW),
-            |index, to| slot(index).next.store(to, site::LIST_LINK),
-            |a, b| slot(a).rank() < slot(b).rank(),
+            |index| self.slot(index).map_or(NONE, |slot| slot.next.load(site::LIST_FOLLOW)),
+            |index, to| {
+                if let Some(slot) = self.slot(index) {
+                    slot.next.store(to, site::LIST_LINK);
+                }
+            },
+            |a, b| self.slot(a).map(LetterSlot::rank) < self.slot(b).map(LetterSlot::rank),
         );
         Mail { post: self, next }
     }
@@ -186,15 +195,15 @@ impl<M: Send + Sync> Iterator for Mail<'_, '_, M> {
     type Item = (From, M);
 
     fn next(&mut self) -> Option<Self::Item> {
-        while self.next != NONE {
+        while let Some(slot) = self.post.slot(self.next) {
             let index = self.next;
-            let slot = &self.post.slots[index as usize];
             let (sender, sequence) = slot.rank();
             self.next = slot.next.load(site::LIST_FOLLOW);
             // SAFETY: `collect` took the letter out of the inbox, so this reader has it alone
             // until the push below gives the slot back.
             let message = unsafe { slot.message.with_mut(Option::take) };
-            self.post.free.push(index);
+            // Refused only if it were no letter of this pool's.
+            let _ours = self.post.free.push(index);
             if let Some(message) = message {
                 return Some((From { sender, sequence }, message));
             }

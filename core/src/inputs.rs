@@ -85,10 +85,7 @@ impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
     /// same sender and place in the sequence would come in the order of arrival.
     ///
     /// # Errors
-    /// [`Rejected`] with the message if all letters are under way.
-    ///
-    /// # Panics
-    /// If there is no unit `to`.
+    /// [`Rejected`] with the message if all letters are under way, or if there is no unit `to`.
     pub fn post(
         &mut self,
         to: UnitId,
@@ -96,7 +93,7 @@ impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
         message: E::Message,
     ) -> Result<(), Rejected<E::Message>> {
         let from = From { sender, sequence: self.posted };
-        self.tables.post.post(&self.tables.unit(to).inbox, self.frame, from, message)?;
+        self.tables.post(to, self.frame, from, message)?;
         self.posted += 1;
         Ok(())
     }

@@ -7,6 +7,7 @@
 //! (§6.3): the device loop reads force and gradient at its own rate, the pipeline at its own.
 
 use crate::error::{Table, TableFull};
+use crate::storage::at;
 use crate::sync::{Atomic, Cell, site};
 
 const INDEX_BITS: u32 = 8;
@@ -58,7 +59,13 @@ impl<T: Copy + Send + Sync, const SLOTS: usize> Latest<T, SLOTS> {
     }
 
     fn leave(&self, slot: u32) {
-        self.slots[slot as usize].left.fetch_add(1, site::LATEST_LEAVE);
+        self.slot(slot).left.fetch_add(1, site::LATEST_LEAVE);
+    }
+
+    /// A slot by the index that `newest` holds or held.
+    fn slot(&self, index: u32) -> &Slot<T> {
+        // SAFETY: it starts as the first one, and only `publish` changes it, to one of all slots.
+        unsafe { at(&self.slots, index as usize) }
     }
 }
 
@@ -72,27 +79,30 @@ pub struct Writer<'c, T, const SLOTS: usize> {
 impl<T: Copy + Send + Sync, const SLOTS: usize> Writer<'_, T, SLOTS> {
     /// Makes `value` the newest. Wait-free: at most `SLOTS` slots are looked at.
     pub fn publish(&mut self, value: T) {
-        let free = self.free_slot();
-        let slot = &self.cell.slots[free as usize];
+        let Some(free) = self.free_slot() else {
+            // Never: readers are limited. A cell that kept its value would harm nobody.
+            debug_assert!(false, "a reader too many");
+            return;
+        };
+        let slot = self.cell.slot(free);
         // SAFETY: every reader that entered this slot has left it (`free_slot`), and none can
         // enter before the swap below publishes it.
         unsafe { slot.value.with_mut(|place| *place = value) };
         slot.left.store(0, site::SLOT_FIELD);
         let old = self.cell.newest.swap(free, site::LATEST_PUBLISH);
-        let retired = &self.cell.slots[(old & INDEX) as usize];
+        let retired = self.cell.slot(old & INDEX);
         retired.entered.store(old >> INDEX_BITS, site::SLOT_FIELD);
         self.newest = free;
     }
 
     /// A slot that nobody is inside. There is one: each reader is inside one slot at most, one is
     /// the newest, and there are two slots more than readers.
-    fn free_slot(&self) -> u32 {
-        let vacant = |&index: &u32| {
-            let slot = &self.cell.slots[index as usize];
+    fn free_slot(&self) -> Option<u32> {
+        let vacant = |&(index, slot): &(u32, &Slot<T>)| {
             let left = slot.left.load(site::LATEST_REUSE) & ENTRIES;
             index != self.newest && slot.entered.load(site::SLOT_FIELD) == left
         };
-        (0..SLOTS as u32).find(vacant).unwrap_or_else(|| unreachable!("readers are limited"))
+        (0..).zip(&self.cell.slots).find(vacant).map(|(index, _)| index)
     }
 }
 
@@ -151,7 +161,7 @@ impl<T: Copy + Send + Sync, const SLOTS: usize> Reader<'_, T, SLOTS> {
             self.inside = self.cell.enter();
         }
         // SAFETY: this reader is inside the slot, so the writer does not touch it.
-        unsafe { self.cell.slots[self.inside as usize].value.with(|value| *value) }
+        unsafe { self.cell.slot(self.inside).value.with(|value| *value) }
     }
 }
 

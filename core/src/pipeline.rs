@@ -133,10 +133,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     /// interface. It is processed by `to`'s first update in a later frame than the one now open.
     ///
     /// # Errors
-    /// [`Rejected`] with the message if all letters are under way.
-    ///
-    /// # Panics
-    /// If there is no unit `to`.
+    /// [`Rejected`] with the message if all letters are under way, or if there is no unit `to`.
     pub fn post(
         &self,
         to: UnitId,
@@ -144,7 +141,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         message: E::Message,
     ) -> Result<(), Rejected<E::Message>> {
         let stamp = self.window.open();
-        self.tables.post.post(&self.tables.unit(to).inbox, stamp, from, message)
+        self.tables.post(to, stamp, from, message)
     }
 
     /// Gives every unit another home, counted round: to balance them, say. At first they are shared out
@@ -224,7 +221,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         if self.rendered_frame(unit) == display {
             return Some(Work::Render(unit));
         }
-        queue.push(unit.0);
+        self.push(Work::Render(unit));
         None
     }
 
@@ -232,12 +229,14 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     #[inline]
     pub(crate) fn push(&self, work: Work) {
         let queues = &self.tables.queues;
-        match work {
-            Work::Enter(unit) => self.home_of(unit).enter.push(unit.0),
-            Work::Interact(id) => queues.interact.push(id.0),
-            Work::Update(unit) => self.home_of(unit).update.push(unit.0),
-            Work::Render(unit) => queues.render[self.rendered_frame(unit).parity()].push(unit.0),
-        }
+        let (queue, index) = match work {
+            Work::Enter(unit) => (&self.home_of(unit).enter, unit.0),
+            Work::Interact(id) => (&queues.interact, id.0),
+            Work::Update(unit) => (&self.home_of(unit).update, unit.0),
+            Work::Render(unit) => (&queues.render[self.rendered_frame(unit).parity()], unit.0),
+        };
+        // A queue has a slot for every index of its table.
+        let _fits = queue.push(index);
     }
 
     fn home_of(&self, unit: UnitId) -> &Home<'m> {

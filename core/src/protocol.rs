@@ -89,11 +89,12 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         }
         let (ids, outcome) =
             self.tables.claim_candidates(others.len() as u32, self.next_frame(unit));
-        let ids: Batch<InteractionId> = ids.collect();
-        for (&id, &other) in ids.iter().zip(others) {
+        let mut batch: Batch<InteractionId> = Vec::new();
+        for (id, &other) in ids.zip(others) {
             self.tables.interaction(id).join([unit.min(other), unit.max(other)]);
+            let _fits = batch.push(id);
         }
-        self.candidates(unit, &ids, out);
+        self.candidates(unit, &batch, out);
         outcome
     }
 

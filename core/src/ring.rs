@@ -8,6 +8,8 @@
 //! Every index is in at most one place at a time, so a ring with a slot for every index is never
 //! full, and push cannot fail.
 
+use crate::error::{Table, TableFull};
+use crate::storage::at;
 use crate::sync::{AtomicWord, CachePadded, const_fn, site, spin_hint};
 
 /// Memory of one slot of a queue, or of the list of arrivals.
@@ -53,25 +55,26 @@ pub struct IndexRing<'m> {
 impl<'m> IndexRing<'m> {
     /// An empty ring over the largest power of two of `slots`.
     ///
-    /// # Panics
-    /// If `slots` is empty.
-    pub fn new(slots: &'m mut [QueueSlot]) -> Self {
-        assert!(!slots.is_empty(), "a ring needs at least one slot");
-        let slot_bits = slots.len().ilog2();
-        let cells = &slots[..1 << slot_bits];
+    /// # Errors
+    /// [`TableFull`] if `slots` is empty.
+    pub fn new(slots: &'m mut [QueueSlot]) -> Result<Self, TableFull> {
+        let full = TableFull { table: Table::Queues, capacity: 0, needed: 1 };
+        let slot_bits = slots.len().checked_ilog2().ok_or(full)?;
+        let cells = slots.get(..1 << slot_bits).ok_or(full)?;
         // Laps are counted from 1: a cell of lap 0 is free for lap 1.
         cells.iter().for_each(|cell| cell.0.store(0, site::EXCLUSIVE));
         let first = 1 << slot_bits;
-        Self {
+        Ok(Self {
             cells,
             head: CachePadded::new(AtomicWord::new(first)),
             tail: CachePadded::new(AtomicWord::new(first)),
             slot_bits,
-        }
+        })
     }
 
     fn slot(&self, position: usize) -> &AtomicWord {
-        &self.cells[position & (self.cells.len() - 1)].0
+        // SAFETY: `new` made the number of cells a power of two, at least one.
+        unsafe { &at(self.cells, position & (self.cells.len() - 1)).0 }
     }
 
     /// The cycle of a position, or of a cell's word: both keep it above `slot_bits`.
@@ -86,13 +89,17 @@ impl<'m> IndexRing<'m> {
 
     /// Appends `index`, which must not be in the ring.
     ///
-    /// # Panics
-    /// If `index` is not below the number of slots: a host's error, caught before it can be
-    /// mistaken for another index.
+    /// # Errors
+    /// [`TableFull`] if `index` is not below the number of slots: caught before it can be mistaken
+    /// for another index. Nothing is pushed then.
     #[inline]
-    pub fn push(&self, index: u32) {
+    pub fn push(&self, index: u32) -> Result<(), TableFull> {
         let index = index as usize;
-        assert!(index < self.cells.len(), "index beyond the ring");
+        let capacity = self.cells.len();
+        if index >= capacity {
+            let needed = index.saturating_add(1);
+            return Err(TableFull { table: Table::Queues, capacity, needed });
+        }
         loop {
             let tail = self.tail.load(site::RING_TAIL_LOAD);
             let cell = self.slot(tail);
@@ -103,7 +110,7 @@ impl<'m> IndexRing<'m> {
                     let word = (self.cycle(tail) << self.slot_bits) | index;
                     if cell.exchange(seen, word, site::RING_CELL_PUBLISH).is_ok() {
                         self.help_tail(tail);
-                        return;
+                        return Ok(());
                     }
                 }
                 // This lap's already: its pusher has not moved the tail yet.
@@ -149,5 +156,24 @@ impl<'m> IndexRing<'m> {
         let head = self.head.load(site::RING_HEAD_LOAD);
         let word = self.slot(head).load(site::RING_CELL_LOOK);
         self.laps_ahead(head, word) == 1
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    fn full(capacity: usize, needed: usize) -> TableFull {
+        TableFull { table: Table::Queues, capacity, needed }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        let mut slots = [const { QueueSlot::new() }; 6];
+        let ring = IndexRing::new(&mut slots).unwrap_or_else(|full| panic!("{full}"));
+        assert_eq!(ring.push(3), Ok(()));
+        assert_eq!(ring.push(4), Err(full(4, 5)), "four of six slots are a power of two");
+        assert_eq!((ring.pop(), ring.pop()), (Some(3), None));
+        assert_eq!(IndexRing::new(&mut []).map(drop), Err(full(0, 1)));
     }
 }

@@ -169,6 +169,20 @@ pub struct Memory<'m, E: Environment> {
     pub queues: &'m mut [QueueSlot],
 }
 
+/// `table[index]`; only tests and models check it.
+///
+/// # Safety
+/// `index` is below the table's length.
+#[inline(always)]
+pub(crate) unsafe fn at<T>(table: &[T], index: usize) -> &T {
+    if cfg!(any(loom, debug_assertions)) {
+        // A weakened memory order, or a fault in the core, is to be seen.
+        return &table[index];
+    }
+    // SAFETY: the caller's promise.
+    unsafe { table.get_unchecked(index) }
+}
+
 /// How many queue slots a pipeline of these sizes needs.
 pub const fn queue_slots(units: usize, interactions: usize, letters: usize, homes: usize) -> usize {
     let rings = 2 * (homes + 1) * slots_for(units) + slots_for(interactions) + slots_for(letters);

@@ -1,14 +1,16 @@
 //! The pipeline's tables: units, interactions, results, letters, and the queues between stages.
 
+use ::core::num::NonZeroU32;
+
 use crate::arrivals::Arrivals;
 use crate::contacts::{Pools, Room};
 use crate::environment::Environment;
 use crate::error::{SetupError, Table, TableFull};
 use crate::frame::Frame;
-use crate::inbox::Post;
+use crate::inbox::{From, Post, Rejected};
 use crate::list;
 use crate::ring::{IndexRing, QueueSlot, slots_for};
-use crate::storage::{Chain, InteractionSlot, Memory, UnitSlot, queue_slots};
+use crate::storage::{Chain, InteractionSlot, Memory, UnitSlot, at, queue_slots};
 use crate::sync::site;
 use crate::unit::{InteractionId, NONE, UnitId};
 
@@ -34,14 +36,20 @@ pub(crate) struct Homes<'m> {
 }
 
 impl<'m> Homes<'m> {
-    fn new(count: usize, mut home: impl FnMut() -> Home<'m>) -> Self {
-        let first = home();
-        Self { first, others: ::core::array::from_fn(|other| (other + 1 < count).then(&mut home)) }
+    fn new(
+        count: usize,
+        mut home: impl FnMut() -> Result<Home<'m>, TableFull>,
+    ) -> Result<Self, TableFull> {
+        let mut homes = Self { first: home()?, others: [const { None }; MOST_HOMES - 1] };
+        for other in homes.others.iter_mut().take(count.saturating_sub(1)) {
+            *other = Some(home()?);
+        }
+        Ok(homes)
     }
 
     /// The number of homes.
-    pub(crate) fn count(&self) -> u32 {
-        self.iter().count() as u32
+    pub(crate) fn count(&self) -> NonZeroU32 {
+        NonZeroU32::MIN.saturating_add(self.iter().skip(1).count() as u32)
     }
 
     fn iter(&self) -> impl Iterator<Item = &Home<'m>> {
@@ -125,34 +133,36 @@ impl<'m, E: Environment> Tables<'m, E> {
             link_modelled(units, interactions)?;
         }
         let mut rest = queues;
-        let mut ring = |indices| {
-            let (slots, others) = ::core::mem::take(&mut rest).split_at_mut(slots_for(indices));
+        let mut slots = |indices| -> &'m mut [QueueSlot] {
+            let (slots, others) = ::core::mem::take(&mut rest)
+                .split_at_mut_checked(slots_for(indices))
+                .unwrap_or_default();
             rest = others;
             slots
         };
-        let homes = Homes::new(homes, || Home {
-            enter: IndexRing::new(ring(units.len())),
-            update: IndexRing::new(ring(units.len())),
-        });
+        let mut ring = |indices| IndexRing::new(slots(indices));
+        let homes = Homes::new(homes, || {
+            Ok(Home { enter: ring(units.len())?, update: ring(units.len())? })
+        })?;
         let queues = Queues {
             homes,
-            interact: IndexRing::new(ring(interactions.len())),
-            render: [IndexRing::new(ring(units.len())), IndexRing::new(ring(units.len()))],
+            interact: ring(interactions.len())?,
+            render: [ring(units.len())?, ring(units.len())?],
         };
-        let free: &'m mut [QueueSlot] = ring(letters.len());
-        let arrivals = Arrivals::new(&mut rest[..units.len()]);
-        let count = units.len() as u64;
+        let post = Post::new(letters, slots(letters.len()))?;
+        let arrivals = Arrivals::new(rest.get_mut(..units.len()).unwrap_or_default());
         let mut tables = Self {
             units,
             interactions,
             pools: Pools::new(contacts, segments),
-            post: Post::new(letters, free),
+            post,
             queues,
             arrivals,
             found: [Room::new(), Room::new()],
         };
-        let homes = u64::from(tables.queues.homes.count());
-        tables.set_homes(|unit| (u64::from(unit.0) * homes / count) as u32);
+        let homes = u64::from(tables.queues.homes.count().get());
+        let shared = |unit: UnitId| (u64::from(unit.0) * homes).checked_div(units.len() as u64);
+        tables.set_homes(|unit| shared(unit).unwrap_or(0) as u32);
         Ok(tables)
     }
 }
@@ -197,14 +207,34 @@ impl<'m, E: Environment + ?Sized> Tables<'m, E> {
         }
     }
 
+    /// A unit that the protocol names; not one that a host names.
     #[inline]
     pub(crate) fn unit(&self, unit: UnitId) -> &UnitSlot<E::Object> {
-        &self.units[unit.index()]
+        // SAFETY: what travels was counted up to the number of units (PROTOCOL.md §9).
+        unsafe { at(self.units, unit.index()) }
     }
 
+    /// An interaction that the protocol names.
     #[inline]
     pub(crate) fn interaction(&self, id: InteractionId) -> &InteractionSlot<E::Interaction> {
-        &self.interactions[id.index()]
+        // SAFETY: what travels was counted up to the number of slots (PROTOCOL.md §9).
+        unsafe { at(self.interactions, id.index()) }
+    }
+
+    /// Posts `message` to a unit that a host names.
+    pub(crate) fn post(
+        &self,
+        to: UnitId,
+        stamp: Frame,
+        from: From,
+        message: E::Message,
+    ) -> Result<(), Rejected<E::Message>> {
+        let Some(unit) = self.units.get(to.index()) else {
+            let (capacity, needed) = (self.units.len(), to.index().saturating_add(1));
+            let full = TableFull { table: Table::Units, capacity, needed };
+            return Err(Rejected { message, full });
+        };
+        self.post.post(&unit.inbox, stamp, from, message)
     }
 
     /// Slots for `count` pairs found in `frame`, or for as many as fit: even frames have the first half

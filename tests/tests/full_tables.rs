@@ -273,6 +273,18 @@ fn letters_from_outside_beyond_the_pool() {
 }
 
 #[test]
+fn letters_to_nobody() {
+    Sizes::spatial(2, 6, 0, 3).with(|pipeline| {
+        let pipeline = pipeline.expect("tables that fit");
+        for (nobody, needed) in [(2, 3), (u32::MAX, 1 << 32)] {
+            let from = Sender { sender: 9, sequence: 0 };
+            let rejected = pipeline.post(UnitId(nobody), from, 41).expect_err("nobody's letter");
+            assert_eq!((rejected.message, rejected.full), (41, full(Table::Units, 2, needed)));
+        }
+    });
+}
+
+#[test]
 fn memory_that_does_not_fit() {
     let good = Sizes::spatial(5, 20, 10, 3);
     assert_eq!(good.refused(), None);

@@ -14,7 +14,8 @@ pub(crate) const ALL: &[Model] = &[
 
 fn post(letters: usize) -> &'static Post<'static, u32> {
     let slots = lend_slice(letters, |_| LetterSlot::new());
-    lend(Post::new(slots, lend_slice(slots_for(letters), |_| QueueSlot::new())))
+    let queue = lend_slice(slots_for(letters), |_| QueueSlot::new());
+    lend(Post::new(slots, queue).unwrap())
 }
 
 fn from(sender: u32, sequence: u32) -> From {

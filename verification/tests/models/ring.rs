@@ -25,11 +25,11 @@ pub(crate) trait Queue: 'static {
 
 impl Queue for IndexRing<'static> {
     fn make(indices: usize) -> Self {
-        Self::new(lend_slice(indices, |_| QueueSlot::new()))
+        Self::new(lend_slice(indices, |_| QueueSlot::new())).unwrap()
     }
 
     fn push(&self, index: u32) {
-        IndexRing::push(self, index);
+        IndexRing::push(self, index).unwrap();
     }
 
     fn pop(&self) -> Option<u32> {
