@@ -8,7 +8,7 @@
 
 use crossbeam_utils::CachePadded;
 
-use crate::sync::{Atomic, const_fn, site, spin_hint};
+use crate::sync::{Atomic, const_fn, seeded, site, spin_hint};
 use crate::unit::NONE;
 
 /// A unit's place in the list of arrivals.
@@ -55,6 +55,7 @@ impl Arrivals {
             own.0.store(newest, site::ARRIVALS_LINK);
             match self.newest.exchange(newest, index, site::ARRIVALS_PUSH) {
                 Ok(earlier) => return (earlier != NONE).then_some(earlier),
+                Err(_) if seeded!(ArrivalNotRetried) => return (newest != NONE).then_some(newest),
                 Err(found) => newest = found,
             }
             spin_hint();

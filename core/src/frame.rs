@@ -3,7 +3,7 @@
 use crossbeam_utils::CachePadded;
 
 use crate::countdown::Countdown;
-use crate::sync::{Atomic, site};
+use crate::sync::{Atomic, seeded, site};
 
 /// A frame's number. It wraps after 2^32 frames; only equality, parity and the distance of
 /// neighbouring frames are ever used, so that wrapping is harmless.
@@ -88,6 +88,9 @@ impl Window {
     pub(crate) fn swapped(&self, frame: Frame) {
         self.renders.arm(self.units);
         self.display.store(frame.next().0, site::DISPLAY_ADVANCE);
+        if seeded!(RendersArmedLate) {
+            self.renders.arm(self.units);
+        }
     }
 
     /// `frame` has been gathered; the gate now gathers the next one.

@@ -7,7 +7,7 @@
 //! (§6.3): the device loop reads force and gradient at its own rate, the pipeline at its own.
 
 use crate::error::{Table, TableFull};
-use crate::sync::{Atomic, Cell, site};
+use crate::sync::{Atomic, Cell, seeded, site};
 
 const INDEX_BITS: u32 = 8;
 const INDEX: u32 = (1 << INDEX_BITS) - 1;
@@ -90,7 +90,8 @@ impl<T: Copy + Send + Sync, const SLOTS: usize> Writer<'_, T, SLOTS> {
         let vacant = |&index: &u32| {
             let slot = &self.cell.slots[index as usize];
             let left = slot.left.load(site::LATEST_REUSE) & ENTRIES;
-            index != self.newest && slot.entered.load(site::SLOT_FIELD) == left
+            let vacant = slot.entered.load(site::SLOT_FIELD) == left;
+            index != self.newest && (vacant || seeded!(SlotReusedEarly))
         };
         (0..SLOTS as u32).find(vacant).unwrap_or_else(|| unreachable!("readers are limited"))
     }

@@ -11,7 +11,7 @@ use crate::frame::{Entry, Frame};
 use crate::inputs::Inputs;
 use crate::pipeline::{BroadPhase, Pipeline};
 use crate::storage::Chain;
-use crate::sync::site;
+use crate::sync::{seeded, site};
 use crate::token::Token;
 use crate::unit::{InteractionId, NONE, UnitId, Work};
 use crate::wait::Waiting;
@@ -80,7 +80,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
             let id = InteractionId(next);
             let slot = self.tables.interaction(id);
             next = slot.next(Chain::Modelled, unit);
-            if !slot.arrivals.arrive() {
+            if !slot.arrivals.arrive() && !seeded!(TestedTwice) {
                 continue;
             }
             slot.arrivals.arm(2);
@@ -97,11 +97,16 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
     /// Counts an interaction at both ends before anyone can end it, then lets it go.
     fn candidate(&self, id: InteractionId, out: &mut impl Outputs) {
         let [a, b] = self.tables.interaction(id).ends();
-        for end in ends(a, b) {
+        if seeded!(CountedAfterEmitted) {
+            out.emit(Work::Interact(id));
+        }
+        for end in ends(a, if seeded!(CountedAtOneEnd) { a } else { b }) {
             self.tables.push_candidate(id, end);
             self.tables.unit(end).pending.add(1);
         }
-        out.emit(Work::Interact(id));
+        if !seeded!(CountedAfterEmitted) {
+            out.emit(Work::Interact(id));
+        }
     }
 
     /// `unit` has entered its frame and made its tests. The last one opens the frame: whatever
@@ -109,13 +114,22 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
     fn leave_gate(&self, unit: UnitId, out: &mut impl Outputs) {
         // Read before leaving: afterwards the unit may be updated by someone else.
         let frame = self.next_frame(unit);
+        if seeded!(UpdatesAfterOwnTests) {
+            self.ready(unit, out);
+        }
         if !self.window.gate.arrive() {
             return;
         }
         self.arrivals.clear();
-        self.tables.reset_pools(frame.next());
+        self.tables.reset_pools(if seeded!(PoolsResetEarly) { frame } else { frame.next() });
         self.window.opened(frame);
+        if seeded!(UpdatesAfterOwnTests) {
+            return;
+        }
         (0..self.tables.units.len() as u32).for_each(|unit| self.ready(UnitId(unit), out));
+        if seeded!(GateArmedLate) {
+            self.window.opened(frame);
+        }
     }
 
     /// One thing less that `unit`'s update waits for.
@@ -174,15 +188,21 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         slot.candidates.store(NONE, site::CANDIDATE_HEAD);
         // The next update waits for its frame's opening and for this frame's rendering. Stored
         // before the unit is passed on to either.
-        slot.pending.arm(2);
+        slot.pending.arm(if seeded!(RenderingNotAwaited) { 1 } else { 2 });
         slot.frame.store(frame.next().0, site::FRAME_TAG);
-        if holder && self.window.display() == frame {
+        if holder && (self.window.display() == frame || seeded!(RenderedBeforeSwap)) {
             out.emit(Work::Render(unit));
         } else {
             out.queue(Work::Render(unit));
         }
         if self.config.entry == Entry::AfterUpdate {
             self.advance(unit, frame, out);
+        }
+        if seeded!(PendingArmedLate) {
+            slot.pending.arm(2);
+        }
+        if seeded!(CandidatesEmptiedLate) {
+            slot.candidates.store(NONE, site::CANDIDATE_HEAD);
         }
         outcome
     }
@@ -217,7 +237,9 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         if self.config.entry == Entry::AfterRender {
             self.advance(unit, frame, out);
         }
-        self.ready(unit, out);
+        if !seeded!(RenderingNotAwaited) {
+            self.ready(unit, out);
+        }
         if self.window.renders.arrive() {
             outcome = outcome.and(env.swap(frame, renderer));
             self.window.swapped(frame);
@@ -229,7 +251,9 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
     fn after_swap(&self, frame: Frame, out: &mut impl Outputs) {
         if frame.next() == self.window.limit {
             // Whoever sleeps shall see that the pipeline is at rest.
-            out.all_done();
+            if !seeded!(EndNotAnnounced) {
+                out.all_done();
+            }
             return;
         }
         if self.config.entry == Entry::AfterSwap {

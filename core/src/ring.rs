@@ -10,7 +10,7 @@
 
 use crossbeam_utils::CachePadded;
 
-use crate::sync::{AtomicWord, const_fn, site, spin_hint};
+use crate::sync::{AtomicWord, const_fn, seeded, site, spin_hint};
 
 /// Memory of one ring slot.
 #[derive(Debug)]
@@ -95,6 +95,11 @@ impl<'m> IndexRing<'m> {
     pub fn push(&self, index: u32) {
         let index = index as usize;
         assert!(index < self.cells.len(), "index beyond the ring");
+        if seeded!(TicketPush) {
+            let place = self.tail.fetch_add(1, site::RING_TAIL_HELP);
+            let word = (self.cycle(place) << self.slot_bits) | index;
+            return self.slot(place).store(word, site::RING_CELL_PUBLISH);
+        }
         loop {
             let tail = self.tail.load(site::RING_TAIL_LOAD);
             let cell = self.slot(tail);
@@ -132,7 +137,9 @@ impl<'m> IndexRing<'m> {
             match self.laps_ahead(head, word) {
                 0 => {
                     let next = head.wrapping_add(1);
-                    if self.head.exchange(head, next, site::RING_HEAD_CLAIM).is_ok() {
+                    if self.head.exchange(head, next, site::RING_HEAD_CLAIM).is_ok()
+                        || seeded!(PopNotRetried)
+                    {
                         return Some((word & (self.cells.len() - 1)) as u32);
                     }
                 }

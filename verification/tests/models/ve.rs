@@ -78,7 +78,7 @@ impl Default for Setup {
 }
 
 impl Setup {
-    fn pairs(&self) -> Vec<[u32; 2]> {
+    pub(crate) fn pairs(&self) -> Vec<[u32; 2]> {
         let social = self.units.min(self.solitary_from);
         (0..social).flat_map(|b| (0..b).map(move |a| [a, b])).collect()
     }
