@@ -27,6 +27,7 @@ explored! {
         pairwise_after_render pairwise_after_swap pools_come_round two_tokens solitary_unit letters
         errors_do_no_harm three_pairs rendering_comes_first two_holders_at_a_swap
         sleeps_through_a_swap finished_shows_all;
+    cost: alone;
 }
 
 /// No model is left out of the list above.

@@ -4,6 +4,7 @@
 
 pub(crate) mod arrivals;
 pub(crate) mod bell;
+pub(crate) mod cost;
 pub(crate) mod countdown;
 pub(crate) mod hunt;
 pub(crate) mod inbox;
@@ -152,6 +153,7 @@ pub(crate) fn all() -> impl Iterator<Item = Model> {
         bell::ALL,
         token::ALL,
         pipeline::ALL,
+        cost::ALL,
     ];
     lists.into_iter().flatten().copied()
 }
