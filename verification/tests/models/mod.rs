@@ -51,6 +51,11 @@ pub(crate) fn lend<T: 'static>(value: T) -> &'static mut T {
     unsafe { &mut *place }
 }
 
+/// Gives back what this thread lent.
+pub(crate) fn free_lent() {
+    LENT.with(RefCell::take).into_iter().for_each(|free| free());
+}
+
 /// A slice of `count` values, lent as by `lend`.
 pub(crate) fn lend_slice<T: 'static>(
     count: usize,
@@ -82,7 +87,7 @@ pub(crate) fn check<T: Ord + Debug + Send + 'static>(
         (builder.max_permutations, builder.max_duration) = (None, None);
         (builder.checkpoint_file, builder.max_threads) = (None, 4);
         builder.check(move || {
-            LENT.with(RefCell::take).into_iter().for_each(|free| free());
+            free_lent();
             counted.fetch_add(1, Ordering::Relaxed);
             EXPLORED.set(EXPLORED.get() + 1);
             let outcome = body(order);
