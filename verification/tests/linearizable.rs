@@ -19,10 +19,13 @@ use linear::specs::{CellOp, Fifo, Letters, MailOp, QueueOp, Register};
 use linear::subjects::{Do, Program, modelled, shipped};
 use models::{Role, check, free_lent, hunt::kill, lend, together};
 use stateright::semantics::SequentialSpec;
+use std::hint::spin_loop;
 use std::sync::atomic::{AtomicU32, Ordering::AcqRel, Ordering::Acquire};
 
 /// Histories of each object on real threads.
-const HISTORIES: u32 = 5000;
+const HISTORIES: u32 = 4000;
+/// Histories that the same threads make, one after the other.
+const ROUNDS: u32 = 200;
 
 /// A pseudo-random number below `bound`.
 fn draw(state: &mut u64, bound: u32) -> u32 {
@@ -30,29 +33,41 @@ fn draw(state: &mut u64, bound: u32) -> u32 {
     (*state >> 33) as u32 % bound
 }
 
-/// Runs `programs` at once on threads and returns their logs.
-fn on_threads<S>(programs: Vec<Program<S>>, state: &mut u64) -> Vec<Log<S>>
+/// Runs each round's programs at once, one round after the other on the same threads, and returns
+/// each round's logs.
+fn on_threads<S>(rounds: Vec<Vec<Program<S>>>) -> Vec<Vec<Log<S>>>
 where
-    S: SequentialSpec<Op: Send, Ret: Send>,
+    S: Object<Op: Send, Ret: Send>,
 {
-    let (ticks, absent) = (AtomicU32::new(0), AtomicU32::new(programs.len() as u32));
-    std::thread::scope(|scope| {
-        let run = |program: Program<S>| {
-            let (pauses, ticks, absent) = (draw(state, 40), &ticks, &absent);
-            scope.spawn(move || {
-                absent.fetch_sub(1, AcqRel);
-                // Spinning, so that they start at once; yielding, for there may be fewer processors.
-                while absent.load(Acquire) > 0 {
-                    (0..500).for_each(|_| std::hint::spin_loop());
-                    std::thread::yield_now();
-                }
-                (0..pauses).for_each(|_| std::hint::spin_loop());
-                program(&|| ticks.fetch_add(1, AcqRel))
-            })
+    let threads = rounds[0].len();
+    let count = |round: &Vec<_>| AtomicU32::new(round.len() as u32);
+    let absent: &Vec<AtomicU32> = &rounds.iter().map(count).collect();
+    let ticks = &AtomicU32::new(0);
+    let mut columns: Vec<Vec<_>> = (0..threads).map(|_| Vec::new()).collect();
+    for round in rounds {
+        columns.iter_mut().zip(round).for_each(|(column, program)| column.push(program));
+    }
+    let run = move |column: Vec<Program<S>>| -> Vec<Log<S>> {
+        let meet = |absent: &AtomicU32| {
+            absent.fetch_sub(1, AcqRel);
+            // Spinning, so that all start at once; yielding, for there may be fewer processors.
+            while absent.load(Acquire) > 0 {
+                (0..500).take_while(|_| absent.load(Acquire) > 0).for_each(|_| spin_loop());
+                std::thread::yield_now();
+            }
         };
-        let running: Vec<_> = programs.into_iter().map(run).collect();
+        let program = |(program, absent): (Program<S>, _)| {
+            meet(absent);
+            program(&|| ticks.fetch_add(1, AcqRel))
+        };
+        column.into_iter().zip(absent).map(program).collect()
+    };
+    let logs: Vec<Vec<Log<S>>> = std::thread::scope(|scope| {
+        let running: Vec<_> =
+            columns.into_iter().map(|column| scope.spawn(move || run(column))).collect();
         running.into_iter().map(|thread| thread.join().expect("no panic")).collect()
-    })
+    });
+    (0..absent.len()).map(|round| logs.iter().map(|log| log[round].clone()).collect()).collect()
 }
 
 /// Whether any two operations of `logs` overlapped.
@@ -68,11 +83,11 @@ where
     S: Object<Op: Send, Ret: Send>,
 {
     let (mut state, mut overlapping) = (1, 0);
-    for _ in 0..HISTORIES {
-        let programs = programs(&mut state);
-        let logs = on_threads::<S>(programs, &mut state);
-        assert!(is_linearizable(spec.clone(), &logs), "{name}: {logs:#?}");
-        overlapping += u32::from(overlaps::<S>(&logs));
+    for _ in 0..HISTORIES / ROUNDS {
+        for logs in on_threads::<S>((0..ROUNDS).map(|_| programs(&mut state)).collect()) {
+            assert!(is_linearizable(spec.clone(), &logs), "{name}: {logs:#?}");
+            overlapping += u32::from(overlaps::<S>(&logs));
+        }
         free_lent();
     }
     println!("{name}: {HISTORIES} histories, {overlapping} of them with operations at once");
@@ -157,7 +172,7 @@ fn inbox_modelled() {
         [vec![[7, 1]], vec![[7, 0]]],
     ];
     let expected = collected.map(|[first, second]| vec![vec![], vec![], first, second]);
-    judge_modelled("linear::inbox", None, Letters::default, programs, expected);
+    judge_modelled("linear::inbox", Some(3), Letters::default, programs, expected);
 }
 
 /// One publishes twice, two read.
