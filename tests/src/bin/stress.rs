@@ -240,7 +240,7 @@ fn inbox() -> Result<(), String> {
 fn latest() -> Result<(), String> {
     let mut cell = Latest::<[u32; 8], 5>::new([0; 8]);
     let (mut writer, readers) = cell.split();
-    let sound = std::thread::scope(|scope| {
+    std::thread::scope(|scope| {
         scope.spawn(move || (1..=TURNS).for_each(|turn| writer.publish([turn; 8])));
         let read = move || {
             let mut reader = readers.reader().map_err(|full| full.to_string())?;
@@ -256,8 +256,7 @@ fn latest() -> Result<(), String> {
         };
         let running: Vec<_> = (0..3).map(|_| scope.spawn(read)).collect();
         running.into_iter().try_for_each(|thread| thread.join().expect("no panic"))
-    });
-    sound
+    })
 }
 
 fn main() -> ExitCode {
