@@ -12,7 +12,7 @@
 
 use crate::frame::Frame;
 use crate::ring::QueueSlot;
-use crate::sync::{AtomicWord, CachePadded, site, spin_hint};
+use crate::sync::{AtomicWord, CachePadded, seeded, site, spin_hint};
 
 /// The frame's arrivals. A cell holds a unit's index and, in its lowest bit, the parity of the frame
 /// that the unit arrived in: every unit arrives in every frame, so a cell that is not yet written in
@@ -43,11 +43,12 @@ impl<'m> Arrivals<'m> {
             let Some(cell) = self.cells.get(end) else { break end };
             let seen = cell.0.load(site::ARRIVALS_LOOK);
             // Last frame's cell is free. Publishing is this one CAS.
-            if seen & 1 != frame.parity()
-                && cell.0.exchange(seen, word, site::ARRIVALS_PUBLISH).is_ok()
-            {
-                self.help_end(end);
-                break end;
+            if seen & 1 != frame.parity() {
+                let published = cell.0.exchange(seen, word, site::ARRIVALS_PUBLISH).is_ok();
+                if published || seeded!(ArrivalNotRetried) {
+                    self.help_end(end);
+                    break end;
+                }
             }
             // This frame's already: who wrote it has not moved the end yet.
             self.help_end(end);

@@ -1,7 +1,7 @@
 //! Frame tags and the window of two frames in flight (§5.5).
 
 use crate::countdown::Countdown;
-use crate::sync::{Atomic, CachePadded, site};
+use crate::sync::{Atomic, CachePadded, seeded, site};
 
 /// A frame's number. It wraps after 2^32 frames; only equality, parity and the distance of
 /// neighbouring frames are ever used, so that wrapping is harmless.
@@ -86,6 +86,9 @@ impl Window {
     pub(crate) fn swapped(&self, frame: Frame) {
         self.renders.arm(self.units);
         self.display.store(frame.next().0, site::DISPLAY_ADVANCE);
+        if seeded!(RendersArmedLate) {
+            self.renders.arm(self.units);
+        }
     }
 
     /// `frame` has been gathered; the gate now gathers the next one.

@@ -8,7 +8,7 @@
 
 use crate::error::{Table, TableFull};
 use crate::storage::at;
-use crate::sync::{Atomic, Cell, site};
+use crate::sync::{Atomic, Cell, seeded, site};
 
 const INDEX_BITS: u32 = 8;
 const INDEX: u32 = (1 << INDEX_BITS) - 1;
@@ -100,7 +100,8 @@ impl<T: Copy + Send + Sync, const SLOTS: usize> Writer<'_, T, SLOTS> {
     fn free_slot(&self) -> Option<u32> {
         let vacant = |&(index, slot): &(u32, &Slot<T>)| {
             let left = slot.left.load(site::LATEST_REUSE) & ENTRIES;
-            index != self.newest && slot.entered.load(site::SLOT_FIELD) == left
+            let vacant = slot.entered.load(site::SLOT_FIELD) == left;
+            index != self.newest && (vacant || seeded!(SlotReusedEarly))
         };
         (0..).zip(&self.cell.slots).find(vacant).map(|(index, _)| index)
     }

@@ -52,6 +52,8 @@ pub mod error;
 pub mod frame;
 pub mod inbox;
 pub mod inputs;
+#[cfg(loom)]
+pub mod instrument;
 pub mod latest;
 mod list;
 pub mod migrate;

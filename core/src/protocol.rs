@@ -12,7 +12,7 @@ use crate::frame::{Entry, Frame};
 use crate::inputs::Inputs;
 use crate::pipeline::{BroadPhase, Pipeline};
 use crate::storage::Chain;
-use crate::sync::site;
+use crate::sync::{seeded, site};
 use crate::token::Token;
 use crate::unit::{InteractionId, NONE, UnitId, Work};
 use crate::wait::Waiting;
@@ -106,7 +106,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
             let id = InteractionId(next);
             let slot = self.tables.interaction(id);
             next = slot.next(Chain::Modelled, unit);
-            if !slot.arrivals.arrive() {
+            if !slot.arrivals.arrive() && !seeded!(TestedTwice) {
                 continue;
             }
             slot.arrivals.arm(2);
@@ -128,16 +128,21 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         if ids.is_empty() {
             return;
         }
+        if seeded!(CountedAfterEmitted) {
+            ids.iter().for_each(|&id| out.emit(Work::Interact(id)));
+        }
         for &id in ids {
             let other = self.tables.interaction(id).other(unit);
-            if other != unit {
+            if other != unit && !seeded!(CountedAtOneEnd) {
                 self.tables.push_candidates(&[id], other);
                 self.tables.unit(other).pending.add(1);
             }
         }
         self.tables.push_candidates(ids, unit);
         self.tables.unit(unit).pending.add(ids.len() as u32);
-        ids.iter().for_each(|&id| out.emit(Work::Interact(id)));
+        if !seeded!(CountedAfterEmitted) {
+            ids.iter().for_each(|&id| out.emit(Work::Interact(id)));
+        }
     }
 
     /// `unit` has entered its frame and made its tests. The last one opens the frame: whatever
@@ -145,17 +150,26 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
     fn leave_gate(&self, unit: UnitId, out: &mut impl Outputs) {
         // Read before leaving: afterwards the unit may be updated by someone else.
         let frame = self.next_frame(unit);
+        if seeded!(UpdatesAfterOwnTests) {
+            self.ready(unit, out);
+        }
         if !self.window.gate.arrive() {
             return;
         }
         self.tables.arrivals.clear();
-        self.tables.reset_pools(frame.next());
+        self.tables.reset_pools(if seeded!(PoolsResetEarly) { frame } else { frame.next() });
         self.window.opened(frame);
+        if seeded!(UpdatesAfterOwnTests) {
+            return;
+        }
         // Queued, not carried: in the order of their numbers, and for whoever comes first.
         for unit in (0..self.tables.units.len() as u32).map(UnitId) {
             if self.tables.unit(unit).pending.arrive() {
                 out.queue(Work::Update(unit));
             }
+        }
+        if seeded!(GateArmedLate) {
+            self.window.opened(frame);
         }
     }
 
@@ -215,15 +229,21 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         slot.candidates.store(NONE, site::CANDIDATE_HEAD);
         // The next update waits for its frame's opening and for this frame's rendering. Stored
         // before the unit is passed on to either.
-        slot.pending.arm(2);
+        slot.pending.arm(if seeded!(RenderingNotAwaited) { 1 } else { 2 });
         slot.frame.store(frame.next().0, site::FRAME_TAG);
-        if holder && self.window.display() == frame {
+        if holder && (self.window.display() == frame || seeded!(RenderedBeforeSwap)) {
             out.emit(Work::Render(unit));
         } else {
             out.queue(Work::Render(unit));
         }
         if self.config.entry == Entry::AfterUpdate {
             self.advance(unit, frame, out);
+        }
+        if seeded!(PendingArmedLate) {
+            slot.pending.arm(2);
+        }
+        if seeded!(CandidatesEmptiedLate) {
+            slot.candidates.store(NONE, site::CANDIDATE_HEAD);
         }
         outcome
     }
@@ -258,7 +278,9 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         if self.config.entry == Entry::AfterRender {
             self.advance(unit, frame, out);
         }
-        self.ready(unit, out);
+        if !seeded!(RenderingNotAwaited) {
+            self.ready(unit, out);
+        }
         if self.window.renders.arrive() {
             outcome = outcome.and(env.swap(frame, renderer));
             self.window.swapped(frame);
@@ -270,7 +292,9 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
     fn after_swap(&self, frame: Frame, out: &mut impl Outputs) {
         if frame.next() == self.window.limit {
             // Whoever sleeps shall see that the pipeline is at rest.
-            out.all_done();
+            if !seeded!(EndNotAnnounced) {
+                out.all_done();
+            }
             return;
         }
         if self.config.entry == Entry::AfterSwap {

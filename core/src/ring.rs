@@ -10,7 +10,7 @@
 
 use crate::error::{Table, TableFull};
 use crate::storage::at;
-use crate::sync::{AtomicWord, CachePadded, const_fn, site, spin_hint};
+use crate::sync::{AtomicWord, CachePadded, const_fn, seeded, site, spin_hint};
 
 /// Memory of one slot of a queue, or of the list of arrivals.
 #[derive(Debug)]
@@ -100,6 +100,12 @@ impl<'m> IndexRing<'m> {
             let needed = index.saturating_add(1);
             return Err(TableFull { table: Table::Queues, capacity, needed });
         }
+        if seeded!(TicketPush) {
+            let place = self.tail.fetch_add(1, site::RING_TAIL_HELP);
+            let word = (self.cycle(place) << self.slot_bits) | index;
+            self.slot(place).store(word, site::RING_CELL_PUBLISH);
+            return Ok(());
+        }
         loop {
             let tail = self.tail.load(site::RING_TAIL_LOAD);
             let cell = self.slot(tail);
@@ -137,7 +143,9 @@ impl<'m> IndexRing<'m> {
             match self.laps_ahead(head, word) {
                 0 => {
                     let next = head.wrapping_add(1);
-                    if self.head.exchange(head, next, site::RING_HEAD_CLAIM).is_ok() {
+                    if self.head.exchange(head, next, site::RING_HEAD_CLAIM).is_ok()
+                        || seeded!(PopNotRetried)
+                    {
                         return Some((word & (self.cells.len() - 1)) as u32);
                     }
                 }

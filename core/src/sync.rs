@@ -65,29 +65,25 @@ impl Site {
     }
 }
 
-/// Which site is weakened, and to what (models only).
 #[cfg(loom)]
-pub mod mutant {
-    use super::{Ordering, Site};
-    use std::sync::RwLock;
-
-    static WEAKENED: RwLock<Option<(&'static str, Ordering)>> = RwLock::new(None);
-
-    /// Runs everything from now on with `site` at `order`; `None` restores the code as shipped.
-    pub fn weaken(mutant: Option<(Site, Ordering)>) {
-        let mut weakened = WEAKENED.write().unwrap_or_else(std::sync::PoisonError::into_inner);
-        *weakened = mutant.map(|(site, order)| (site.name, order));
-    }
-
-    impl Site {
-        pub(super) fn effective(self) -> Ordering {
-            match *WEAKENED.read().unwrap_or_else(std::sync::PoisonError::into_inner) {
-                Some((name, order)) if name == self.name => order,
-                _ => self.order,
-            }
-        }
+impl Site {
+    fn effective(self) -> Ordering {
+        crate::instrument::effective(self)
     }
 }
+
+/// Whether a model runs with this bug of `instrument::Fault`; `false` in every other build, which
+/// has no trace of it.
+macro_rules! seeded {
+    ($fault:ident) => {{
+        #[cfg(loom)]
+        let seeded = crate::instrument::is_seeded(crate::instrument::Fault::$fault);
+        #[cfg(not(loom))]
+        let seeded = false;
+        seeded
+    }};
+}
+pub(crate) use seeded;
 
 macro_rules! sites {
     ($($(#[$doc:meta])* $name:ident = $order:ident;)*) => {
@@ -246,7 +242,13 @@ macro_rules! atomic {
             /// On failure the value found is only a hint for the retry, hence Relaxed.
             #[inline(always)]
             pub(crate) fn exchange(&self, old: $int, new: $int, site: Site) -> Result<$int, $int> {
-                self.0.compare_exchange(old, new, site.effective(), Ordering::Relaxed)
+                let outcome =
+                    self.0.compare_exchange(old, new, site.effective(), Ordering::Relaxed);
+                #[cfg(loom)]
+                if outcome.is_err() {
+                    crate::instrument::retried();
+                }
+                outcome
             }
         }
     };
@@ -270,6 +272,8 @@ pub(crate) fn fence(site: Site) {
 /// Says inside a retry loop that another thread has to move first.
 #[inline(always)]
 pub(crate) fn spin_hint() {
+    #[cfg(loom)]
+    crate::instrument::retried();
     #[cfg(loom)]
     loom::hint::spin_loop();
     #[cfg(not(loom))]

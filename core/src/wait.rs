@@ -5,7 +5,7 @@
 //! announces itself, fences, and looks for work again; a worker that queued work fences and looks
 //! for sleepers. Of two fences one is first, so one of the two sees the other.
 
-use crate::sync::{Atomic, CachePadded, fence, site};
+use crate::sync::{Atomic, CachePadded, fence, seeded, site};
 
 /// How a host's workers sleep and are woken.
 pub trait Waiting: Sync {
@@ -76,9 +76,12 @@ impl Bell {
     /// Sleeps unless `look` still finds work after the announcement.
     pub(crate) fn sleep_unless(&self, waiting: &impl Waiting, look: impl FnOnce() -> bool) {
         self.sleepers.fetch_add(1, site::BELL_ANNOUNCE);
-        let seen = Epoch(self.epoch.load(site::BELL_EPOCH_SEEN));
+        let mut seen = Epoch(self.epoch.load(site::BELL_EPOCH_SEEN));
         fence(site::FENCE_SLEEP);
         if !look() {
+            if seeded!(EpochNotedLate) {
+                seen = Epoch(self.epoch.load(site::BELL_EPOCH_SEEN));
+            }
             waiting.sleep(self, seen);
         }
         self.sleepers.fetch_sub(1, site::BELL_ANNOUNCE);
@@ -132,6 +135,7 @@ impl Bells {
     /// holder only for what the others are too few for, or to render.
     pub(crate) fn announce(&self, waiting: &impl Waiting, any: u32, renders: u32) {
         fence(site::FENCE_RING);
+        let any = if seeded!(RenderingCallsAnyone) { any.saturating_add(renders) } else { any };
         let others = if any > 0 { self.others.ring(waiting, any) } else { 0 };
         let for_holders = any - others + renders;
         if for_holders > 0 {

@@ -8,7 +8,7 @@ use crate::migrate::migrate;
 use crate::pipeline::Pipeline;
 use crate::probe::{NoProbe, Probe};
 use crate::stage::{Stage, Stages};
-use crate::sync::{fence, site};
+use crate::sync::{fence, seeded, site};
 use crate::token::Token;
 use crate::unit::{UnitId, Work};
 use crate::wait::{Spin, Waiting};
@@ -90,7 +90,13 @@ impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
     /// answered: whoever called counted on it, and may sleep or have left by now.
     fn leave(&mut self) {
         self.set_hungry(false);
+        if seeded!(LeavesWithCarry) {
+            self.works.clear();
+        }
         self.shed();
+        if seeded!(CallNotPassedOn) {
+            return self.announce();
+        }
         // Whoever still counts this worker among the sleepers has queued its work before this.
         fence(site::FENCE_LEAVE);
         let left = self.pipeline.visible_anywhere(true);
@@ -100,6 +106,9 @@ impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
     }
 
     fn announce(&mut self) {
+        if seeded!(BatchNotFlushed) && self.queued + self.renders < 3 {
+            return;
+        }
         if self.queued > 0 || self.renders > 0 {
             self.pipeline.bells.announce(&self.pipeline.waiting, self.queued, self.renders);
             (self.queued, self.renders) = (0, 0);
@@ -238,6 +247,7 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         let holder = self.token.is_some();
         // Rendering first: only holders can, and a chain of carry-overs must not starve it.
         if holder
+            && !seeded!(CarriedBeforeRendering)
             && !matches!(self.carry.works.last(), Some(Work::Render(_)))
             && pipeline.render_visible()
             && let Some(work) = pipeline.pop_render()

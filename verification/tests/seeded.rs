@@ -7,7 +7,7 @@ use loom::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use models::arrivals::Meets;
 use models::countdown::Counts;
 use models::ring::Queue;
-use models::{Guarded, Role, arrivals, check, countdown, lend, lend_slice, ring, together};
+use models::{Guarded, Role, arrivals, check, cost, countdown, lend, lend_slice, ring, together};
 use std::panic::catch_unwind;
 
 /// Asserts that `model` fails, saying `reason`.
@@ -19,6 +19,15 @@ fn caught(model: fn(), reason: &str) {
         .or_else(|| failure.downcast_ref::<&str>().copied())
         .unwrap_or_default();
     assert!(said.contains(reason), "failed for another reason: {said}");
+}
+
+/// The bounds of a step, made smaller than a step is.
+#[test]
+fn a_bound_that_is_too_small_is_noticed() {
+    cost::tighten(50);
+    caught(cost::ALL[0].1, "accesses, ");
+    cost::tighten(20);
+    caught(models::named("pipeline::spatial_after_update"), "accesses, ");
 }
 
 /// A ring whose push takes a ticket first and fills the slot later. Positions count from 1.

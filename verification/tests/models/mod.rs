@@ -4,7 +4,9 @@
 
 pub(crate) mod arrivals;
 pub(crate) mod bell;
+pub(crate) mod cost;
 pub(crate) mod countdown;
+pub(crate) mod hunt;
 pub(crate) mod inbox;
 pub(crate) mod latest;
 pub(crate) mod pipeline;
@@ -12,7 +14,7 @@ pub(crate) mod ring;
 pub(crate) mod token;
 mod ve;
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 use std::fmt::Debug;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -30,6 +32,8 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 type Free = Box<dyn FnOnce()>;
 
 thread_local! {
+    /// Executions explored by this thread so far, of all models.
+    static EXPLORED: Cell<usize> = const { Cell::new(0) };
     static LENT: RefCell<Vec<Free>> = const { RefCell::new(Vec::new()) };
 }
 
@@ -45,6 +49,11 @@ pub(crate) fn lend<T: 'static>(value: T) -> &'static mut T {
     LENT.with(|lent| lent.borrow_mut().push(Box::new(free)));
     // SAFETY: the allocation is this caller's alone, and stays until `check` frees it.
     unsafe { &mut *place }
+}
+
+/// Gives back what this thread lent.
+pub(crate) fn free_lent() {
+    LENT.with(RefCell::take).into_iter().for_each(|free| free());
 }
 
 /// A slice of `count` values, lent as by `lend`.
@@ -78,8 +87,9 @@ pub(crate) fn check<T: Ord + Debug + Send + 'static>(
         (builder.max_permutations, builder.max_duration) = (None, None);
         (builder.checkpoint_file, builder.max_threads) = (None, 4);
         builder.check(move || {
-            LENT.with(RefCell::take).into_iter().for_each(|free| free());
+            free_lent();
             counted.fetch_add(1, Ordering::Relaxed);
+            EXPLORED.set(EXPLORED.get() + 1);
             let outcome = body(order);
             lock(&seen).insert(outcome);
         });
@@ -148,13 +158,13 @@ pub(crate) fn all() -> impl Iterator<Item = Model> {
         bell::ALL,
         token::ALL,
         pipeline::ALL,
+        cost::ALL,
     ];
     lists.into_iter().flatten().copied()
 }
 
-/// Runs the model called `name`.
-pub(crate) fn run(name: &str) {
-    let (_, model) =
-        all().find(|model| model.0 == name).unwrap_or_else(|| panic!("no model {name}"));
-    model();
+/// The model called `name`.
+pub(crate) fn named(name: &str) -> fn() {
+    let found = all().find(|model| model.0 == name);
+    found.unwrap_or_else(|| panic!("no model {name}")).1
 }

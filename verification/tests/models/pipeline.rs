@@ -1,13 +1,19 @@
 //! The whole pipeline: the real code, a small environment that checks every callback.
 
-use super::ve::Event::{Met, Rendered, Swapped};
-use super::ve::{Event, Screen, Setup, World, build, step, verify, work};
+use super::ve::Event::{Met, Rendered, Swapped, Updated};
+use super::ve::{Event, Piped, Screen, Setup, World, build, step, verify, work};
 use super::{Guarded, Model, Role, check, lend, lock, together};
 use dualframe_core_model::frame::Entry;
 use dualframe_core_model::pipeline::BroadPhase;
+use dualframe_core_model::stage::Stage;
+use dualframe_core_model::wait::Spin;
 use dualframe_core_model::worker::{Step, Worker};
 
 pub(crate) const ALL: &[Model] = &[
+    ("pipeline::two_holders_at_a_swap", two_holders_at_a_swap),
+    ("pipeline::rendering_waits_for_a_swap", rendering_waits_for_a_swap),
+    ("pipeline::sleeps_through_a_swap", sleeps_through_a_swap),
+    ("pipeline::rendering_comes_first", rendering_comes_first),
     ("pipeline::spatial_after_update", spatial_after_update),
     ("pipeline::spatial_after_render", spatial_after_render),
     ("pipeline::spatial_after_swap", spatial_after_swap),
@@ -19,6 +25,7 @@ pub(crate) const ALL: &[Model] = &[
     ("pipeline::solitary_unit", solitary_unit),
     ("pipeline::letters", letters),
     ("pipeline::errors_do_no_harm", errors_do_no_harm),
+    ("pipeline::three_pairs", three_pairs),
     ("pipeline::finished_shows_all", finished_shows_all),
 ];
 
@@ -44,8 +51,57 @@ fn overlap(journal: &[Event]) -> Overlap {
     }
 }
 
-/// A worker that goes from thread to thread.
-type Moving = Worker<'static, 'static, World>;
+/// A worker that goes from thread to thread. It is not asked to leave a model that has failed:
+/// what it shared is gone by then.
+struct Moving(Option<Worker<'static, 'static, World>>);
+
+impl Moving {
+    fn at(pipeline: &'static Piped<Spin>, home: u32) -> Self {
+        Self(Some(pipeline.worker_at(home)))
+    }
+
+    fn worker(&mut self) -> &mut Worker<'static, 'static, World> {
+        self.0.as_mut().unwrap()
+    }
+
+    /// With a token for `screen`, if one is left.
+    fn hold(&mut self, pipeline: &'static Piped<Spin>, screen: Screen) {
+        if let Ok(token) = pipeline.token(screen) {
+            assert!(self.worker().hold(token).is_ok());
+        }
+    }
+
+    fn step(&mut self, world: &World) -> Step {
+        step(self.worker(), world)
+    }
+
+    /// Steps until `event`, however long others keep this worker waiting.
+    fn step_until(&mut self, world: &World, event: Event) {
+        while !lock(&world.journal).contains(&event) {
+            if self.step(world) == Step::Idle {
+                loom::thread::yield_now();
+            }
+        }
+    }
+
+    /// Finishes the run, alone.
+    fn finish(mut self, pipeline: &'static Piped<Spin>, world: &World) -> Vec<Event> {
+        let mut idle = 0;
+        while !pipeline.finished() {
+            idle = if self.step(world) == Step::Idle { idle + 1 } else { 0 };
+            assert!(idle < 4, "unfinished, and no work to be seen: {:?}", lock(&world.journal));
+        }
+        verify(pipeline, world)
+    }
+}
+
+impl Drop for Moving {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            std::mem::forget(self.0.take());
+        }
+    }
+}
 
 /// Explores a window of two workers' steps, wherever in the run it lies.
 ///
@@ -65,6 +121,10 @@ fn two_workers(
     let alone = did.map(|did| (did, AfterSwap));
     let both = overlaps.iter().map(|&overlap| ([true, true], overlap));
     let mut expected: Vec<_> = alone.into_iter().chain(both).collect();
+    if setup.pairs().len() > 1 {
+        // One of several pairs is met before another unit is rendered.
+        expected.push(([false, true], BeforeSwap));
+    }
     if setup.solitary_from < setup.units {
         // With one unit more to turn to, frames overlap wherever the window lies.
         expected = vec![([false, false], BeforeRender)];
@@ -74,24 +134,17 @@ fn two_workers(
     let body = move |order: usize| -> Outcome {
         let (pipeline, world) = build(setup);
         let screen: Screen = lend(Guarded::new(0));
-        let hold = |worker: &mut Moving| {
-            if let Ok(token) = pipeline.token(screen) {
-                assert!(worker.hold(token).is_ok());
-            }
-        };
-        let mut workers = [pipeline.worker_at(0), pipeline.worker_at(1)];
-        hold(&mut workers[0]);
-        if setup.tokens > 1 {
-            hold(&mut workers[1]);
-        }
+        let mut workers = [Moving::at(pipeline, 0), Moving::at(pipeline, 1)];
+        // The second holds one only if there are two.
+        workers.iter_mut().for_each(|worker| worker.hold(pipeline, screen));
         for turn in 0..order / 2 {
-            step(&mut workers[turn % 2], world);
+            workers[turn % 2].step(world);
         }
         let role = |mut worker: Moving, leaves: bool| -> Role<(bool, Option<Moving>)> {
             Box::new(move || {
                 let mut did = false;
                 for _ in 0..window {
-                    did |= step(&mut worker, world) != Step::Idle;
+                    did |= worker.step(world) != Step::Idle;
                 }
                 (did, (!leaves).then_some(worker))
             })
@@ -101,15 +154,11 @@ fn two_workers(
         let parts = together(order, vec![role(holder, holder_leaves), role(other, !holder_leaves)]);
         let did = [parts[0].0, parts[1].0];
         let mut left: Vec<_> = parts.into_iter().filter_map(|(_, worker)| worker).collect();
-        if left[0].token().is_none() {
-            hold(&mut left[0]);
+        let mut last = left.remove(0);
+        if last.worker().token().is_none() {
+            last.hold(pipeline, screen);
         }
-        let mut idle = 0;
-        while !pipeline.finished() {
-            idle = if step(&mut left[0], world) == Step::Idle { idle + 1 } else { 0 };
-            assert!(idle < 4, "unfinished, and no work to be seen: {:?}", lock(&world.journal));
-        }
-        (did, overlap(&verify(pipeline, world)))
+        (did, overlap(&last.finish(pipeline, world)))
     };
     check(name, Some(bound), 2 * starts, expected, body);
 }
@@ -179,6 +228,123 @@ fn letters() {
 fn errors_do_no_harm() {
     let setup = Setup { fail: true, ..Setup::default() };
     two_workers("pipeline::errors_do_no_harm", setup, (1, 3, 20), ANY);
+}
+
+/// Three units, each pair of which interacts: a unit that enters last finds two, and its worker
+/// carries one and queues the other.
+fn three_pairs() {
+    let setup = Setup { units: 3, ..Setup::default() };
+    two_workers("pipeline::three_pairs", setup, (1, 2, 26), ANY);
+}
+
+/// In whatever order two workers step, the holder renders whenever a rendering waits: what it
+/// carries must not starve it. Nothing runs at once here.
+fn rendering_comes_first() {
+    check("pipeline::rendering_comes_first", None, 1 << 10, [()], |order| {
+        let setup = Setup { entry: Entry::AfterRender, ..Setup::default() };
+        let (pipeline, world) = build(setup);
+        let mut workers = [Moving::at(pipeline, 0), Moving::at(pipeline, 1)];
+        workers[0].hold(pipeline, lend(Guarded::new(0)));
+        let turns = (0..10).map(|turn| order >> turn & 1).chain((0..).map(|turn| turn % 2));
+        for turn in turns.take_while(|_| !pipeline.finished()).take(40) {
+            let logged = |event| lock(&world.journal).contains(&event);
+            let frame = pipeline.frame().0;
+            let waits = |unit| logged(Updated(unit, frame)) && !logged(Rendered(unit, frame));
+            let due = turn == 0 && (waits(0) || waits(1));
+            let did = workers[turn].step(world);
+            assert!(!due || did == Step::Worked(Stage::Render), "a rendering waits: {did:?}");
+        }
+        verify(pipeline, world);
+    });
+}
+
+/// Two units that do not interact, two tokens: unit 0 is rendered in frame 0, unit 1 waits for it.
+fn half_rendered(frames: u32) -> (&'static Piped<Spin>, &'static World, Screen, Moving) {
+    let setup = Setup { units: 2, frames, tokens: 2, solitary_from: 0, ..Setup::default() };
+    let (pipeline, world) = build(setup);
+    let screen: Screen = lend(Guarded::new(0));
+    let mut worker = Moving::at(pipeline, 0);
+    worker.step_until(world, Updated(1, 0));
+    worker.hold(pipeline, screen);
+    worker.step_until(world, Rendered(0, 0));
+    (pipeline, world, screen, worker)
+}
+
+/// One holder renders the frame's last unit and swaps while another is about to render the next
+/// frame's first one.
+fn two_holders_at_a_swap() {
+    let worked = [Stage::Update, Stage::Render].map(Step::Worked);
+    let expected = [Step::Idle].into_iter().chain(worked).map(|step| format!("{step:?}"));
+    check("pipeline::two_holders_at_a_swap", Some(2), 2, expected, |order| {
+        let (pipeline, world, screen, mut swaps) = half_rendered(2);
+        drop(swaps.worker().release());
+        swaps.step_until(world, Updated(0, 1));
+        swaps.hold(pipeline, screen);
+        let mut follows = Moving::at(pipeline, 0);
+        follows.hold(pipeline, screen);
+        let swap: Role<(Step, Moving)> = Box::new(move || (swaps.step(world), swaps));
+        let follow: Role<(Step, Moving)> = Box::new(move || (follows.step(world), follows));
+        let mut parts = together(order, vec![swap, follow]);
+        let (did, last) = parts.remove(1);
+        drop(parts);
+        last.finish(pipeline, world);
+        format!("{did:?}")
+    });
+}
+
+/// One holder renders the frame's last unit and swaps while another goes on with the next frame: what
+/// that one updates it may not render before the swap, however long that takes.
+fn rendering_waits_for_a_swap() {
+    let [update, render] = [Stage::Update, Stage::Render].map(Step::Worked);
+    let idle = Step::Idle;
+    let expected = [
+        [idle, idle],
+        [idle, update],
+        [render, render],
+        [render, update],
+        [update, idle],
+        [update, render],
+    ];
+    let expected = expected.map(|did| format!("{did:?}"));
+    check("pipeline::rendering_waits_for_a_swap", Some(2), 2, expected, |order| {
+        let (pipeline, world, screen, mut swaps) = half_rendered(2);
+        let mut goes_on = Moving::at(pipeline, 0);
+        goes_on.hold(pipeline, screen);
+        let swap: Role<([Step; 2], Moving)> =
+            Box::new(move || ([swaps.step(world), Step::Idle], swaps));
+        let go_on: Role<([Step; 2], Moving)> =
+            Box::new(move || ([0, 1].map(|_| goes_on.step(world)), goes_on));
+        let mut parts = together(order, vec![swap, go_on]);
+        let (did, last) = parts.remove(1);
+        drop(parts);
+        last.finish(pipeline, world);
+        format!("{did:?}")
+    });
+}
+
+/// A holder looks which frame is on display and is suspended through the swap, until the queue that
+/// it looked at holds a unit of the frame after next: it must not render that.
+fn sleeps_through_a_swap() {
+    let worked = [Stage::Update, Stage::Render].map(Step::Worked);
+    let expected = [Step::Idle].into_iter().chain(worked).map(|step| format!("{step:?}"));
+    check("pipeline::sleeps_through_a_swap", Some(1), 2, expected, |order| {
+        let (pipeline, world, screen, mut busy) = half_rendered(3);
+        let mut sleepy = Moving::at(pipeline, 0);
+        sleepy.hold(pipeline, screen);
+        let pass: Role<Option<Step>> = Box::new(move || {
+            busy.step_until(world, Rendered(0, 1));
+            // Without a token it leaves the other unit's rendering to others, and goes on.
+            drop(busy.worker().release());
+            busy.step_until(world, Updated(0, 2));
+            None
+        });
+        let look: Role<Option<Step>> = Box::new(move || Some(sleepy.step(world)));
+        let did = together(order, vec![pass, look])[1].unwrap();
+        let mut last = Moving::at(pipeline, 0);
+        last.hold(pipeline, screen);
+        last.finish(pipeline, world);
+        format!("{did:?}")
+    });
 }
 
 /// Who sees that the pipeline has finished sees all that was rendered: no join in between.

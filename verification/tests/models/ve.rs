@@ -1,5 +1,6 @@
 //! A small environment that checks every callback, for the models of the whole pipeline.
 
+use super::cost::{metered, note};
 use super::{Guarded, lend, lend_slice, lock};
 use dualframe_core_model::contacts::{ContactSlot, Contacts, SegmentSlot};
 use dualframe_core_model::environment::{Environment, Pair};
@@ -78,7 +79,7 @@ impl Default for Setup {
 }
 
 impl Setup {
-    fn pairs(&self) -> Vec<[u32; 2]> {
+    pub(crate) fn pairs(&self) -> Vec<[u32; 2]> {
         let social = self.units.min(self.solitary_from);
         (0..social).flat_map(|b| (0..b).map(move |a| [a, b])).collect()
     }
@@ -140,6 +141,7 @@ impl Environment for World {
     fn broad_phase(&self, a: &Body, b: &Body) -> bool {
         assert_eq!(a.updates, b.updates, "both ends are in one frame");
         self.log(Met([a.id.min(b.id), a.id.max(b.id)], a.updates));
+        note(|did| (did.tests, did.found) = (did.tests + 1, did.found + 1));
         true
     }
 
@@ -157,6 +159,7 @@ impl Environment for World {
         let result = response(a.value, b.value, pair.frame.0);
         contacts.push(&[result])?;
         contacts.push(&[result ^ 1])?;
+        note(|did| (did.stage, did.pushes) = (Stage::Interaction, 2));
         self.log(Interacted([a.id, b.id], pair.frame.0));
         self.outcome()
     }
@@ -169,10 +172,12 @@ impl Environment for World {
         inputs: &mut Inputs<'_, '_, Self>,
     ) -> Result<(), Failure> {
         assert_eq!((unit.0, frame.0), (body.id, body.updates), "updates in order");
+        note(|did| did.stage = Stage::Update);
         let mut before = None;
         for interaction in inputs.interactions() {
             assert!(before < Some(interaction.other), "interactions in pair order");
             before = Some(interaction.other);
+            note(|did| did.candidates += 1);
             assert_eq!(*interaction.state, frame.0, "the interaction of this frame");
             for segment in interaction.contacts {
                 body.value = segment.iter().fold(body.value, |value, &term| fold(value, term));
@@ -186,6 +191,7 @@ impl Environment for World {
         if self.setup.letters && unit.0 == 0 {
             let posted = inputs.post(UnitId(self.setup.units - 1), 0, frame.0);
             assert!(posted.is_ok(), "letters for two frames");
+            note(|did| did.posts += 1);
         }
         body.updates += 1;
         lock(&self.values)[unit.index()] = body.value;
@@ -200,6 +206,7 @@ impl Environment for World {
         body: &Body,
         screen: &mut Screen,
     ) -> Result<(), Failure> {
+        note(|did| did.stage = Stage::Render);
         assert_eq!((unit.0, frame.0 + 1), (body.id, body.updates), "rendered as updated");
         assert_eq!(screen.get(), frame.0, "all frames before are swapped, this one is not");
         self.log(Rendered(unit.0, frame.0));
@@ -209,6 +216,7 @@ impl Environment for World {
     fn swap(&self, frame: Frame, screen: &mut Screen) -> Result<(), Failure> {
         assert_eq!(screen.get(), frame.0, "frames swap in order");
         screen.set(frame.0 + 1);
+        note(|did| did.swaps = true);
         self.log(Swapped(frame.0));
         self.outcome()
     }
@@ -259,19 +267,36 @@ pub(crate) fn build_with<W: Waiting + 'static>(
 }
 
 /// Of two units each has a home of its own, so that workers meet both at home and elsewhere.
-const HOMES: usize = 2;
+pub(crate) const HOMES: usize = 2;
 
 /// A pipeline whose workers spin where they wait.
 pub(crate) fn build(setup: Setup) -> (&'static Piped<Spin>, &'static World) {
     build_with(setup, Spin)
 }
 
-/// One step; asserts that it fails only where it was asked to.
+/// One step; asserts that it fails only where it was asked to, and what it cost.
 pub(crate) fn step<W: Waiting>(
     worker: &mut Worker<'static, 'static, World, W>,
     world: &World,
 ) -> Step {
-    match worker.step(world) {
+    step_metered(worker, world, None)
+}
+
+/// A step with which nobody interferes; `opens` says whether it opens a frame.
+pub(crate) fn step_alone<W: Waiting>(
+    worker: &mut Worker<'static, 'static, World, W>,
+    world: &World,
+    opens: bool,
+) -> Step {
+    step_metered(worker, world, Some(opens))
+}
+
+fn step_metered<W: Waiting>(
+    worker: &mut Worker<'static, 'static, World, W>,
+    world: &World,
+    opens: Option<bool>,
+) -> Step {
+    match metered(world.setup.units, opens, || worker.step(world)) {
         Ok(step) => step,
         Err(Failure::Asked) => {
             assert!(world.setup.fail);

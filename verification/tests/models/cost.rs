@@ -1,0 +1,165 @@
+//! What one step may cost: the table of PROTOCOL.md §8, asserted of every step of every model.
+
+use super::ve::{HOMES, Setup, build, step_alone, verify};
+use super::{Guarded, Model, check, lend};
+use dualframe_core_model::frame::Entry;
+use dualframe_core_model::instrument::{Cost, meter};
+use dualframe_core_model::pipeline::BroadPhase;
+use dualframe_core_model::stage::Stage;
+use dualframe_core_model::worker::Step;
+use std::cell::Cell;
+
+/// What a step did, as its callbacks saw it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Did {
+    /// The last callback's stage; the broad phase if there was none.
+    pub(crate) stage: Stage,
+    /// Bounding volumes tested.
+    pub(crate) tests: u32,
+    /// Pairs that may interact.
+    pub(crate) found: u32,
+    /// Pushes of contacts.
+    pub(crate) pushes: u32,
+    /// The updated unit's interactions, read once.
+    pub(crate) candidates: u32,
+    /// Letters posted.
+    pub(crate) posts: u32,
+    /// Whether a frame was swapped.
+    pub(crate) swaps: bool,
+}
+
+const NOTHING: Did = Did {
+    stage: Stage::BroadPhase,
+    tests: 0,
+    found: 0,
+    pushes: 0,
+    candidates: 0,
+    posts: 0,
+    swaps: false,
+};
+
+loom::thread_local! {
+    static DID: Cell<Did> = Cell::new(NOTHING);
+}
+
+thread_local! {
+    /// What the bounds are multiplied by, in percent: to see them fail.
+    static SHARE: Cell<u32> = const { Cell::new(100) };
+    /// The largest share of its bound that a step of each stage came to, in percent.
+    static REACHED: Cell<[u32; 4]> = const { Cell::new([0; 4]) };
+}
+
+/// Makes every bound smaller from now on: so many percent of what the table says.
+pub(crate) fn tighten(percent: u32) {
+    SHARE.set(percent);
+}
+
+/// A callback notes what it did.
+pub(crate) fn note(add: impl FnOnce(&mut Did)) {
+    DID.with(|cell| {
+        let mut did = cell.get();
+        add(&mut did);
+        cell.set(did);
+    });
+}
+
+/// Work units that a worker carries at most, under loom.
+const CARRIED: u32 = 1;
+/// Letters under way at most, in any model.
+const LETTERS: u32 = 2;
+
+/// A push onto a ring that nobody disputes.
+const PUSH: u32 = 4;
+/// A pop that nobody disputes, or that finds the ring empty.
+const POP: u32 = 3;
+/// Passing a work unit on: whose it is, whether somebody is hungry, its frame, the push.
+const EMIT: u32 = 3 + PUSH;
+/// One fence, two bells.
+const ANNOUNCE: u32 = 5;
+/// Looks at all queues, and pops from the one chosen; a rendering of another frame goes back.
+const LOOK: u32 = 9 + (2 + POP + PUSH);
+/// Rendering is looked for first, then anything at home and elsewhere, and at most four times at each home
+/// what was seen may be gone.
+const FIND: u32 = 12 + HOMES as u32 * 4 * LOOK;
+/// Where nobody takes away what was seen.
+const FIND_ALONE: u32 = 3 + (HOMES as u32 - 1) * 9 + LOOK;
+/// Once round a loop whose word another thread changed.
+const RETRY: u32 = 4;
+
+/// Sorting a list of `n` by merges: a pass for each doubling and one to see that it is sorted; `each`
+/// accesses for an element in a pass.
+fn sort(n: u32, each: u32) -> u32 {
+    (n * each + 3) * (1 + n.next_power_of_two().ilog2())
+}
+
+/// The most that a step may cost that did `did` in a pipeline of `units`, retries apart.
+///
+/// Each unit has a modelled interaction with each other. `opens`: whether it opens a frame, where nobody interferes; `None` where others do, and it may.
+fn bound(units: u32, did: Did, opens: Option<bool>) -> u32 {
+    let find = if opens.is_some() { FIND_ALONE } else { FIND };
+    let share = 2 + CARRIED * (1 + PUSH) + ANNOUNCE;
+    let gate = |opens| if opens { 9 + units * (1 + EMIT) } else { 2 };
+    // A solitary unit leaves the gate where others are passed on; there is none where one is alone.
+    let pass_on = EMIT + if opens.is_none() { gate(true) } else { 0 };
+    let work = match did.stage {
+        Stage::BroadPhase => {
+            4 + 4 * (units - 1) + did.tests + did.found * (19 + EMIT) + gate(opens != Some(false))
+        }
+        Stage::Interaction => 4 + 2 * did.pushes + 2 * (1 + EMIT),
+        Stage::Update => {
+            let candidates = sort(did.candidates, 13) + 6 * did.candidates;
+            let letters = 2 + LETTERS * (5 + 3 + PUSH) + sort(LETTERS, 7);
+            7 + candidates + letters + did.posts * (6 + POP) + EMIT + pass_on
+        }
+        // Under `Entry::AfterSwap` every unit is passed on.
+        Stage::Render => 5 + (1 + EMIT) + if did.swaps { units * EMIT } else { 0 } + pass_on,
+    };
+    find + share + 3 + work + ANNOUNCE
+}
+
+/// Runs `step` and asserts that it cost no more than the table says.
+pub(crate) fn metered<R>(units: u32, opens: Option<bool>, step: impl FnOnce() -> R) -> R {
+    DID.with(|did| did.set(NOTHING));
+    meter(true);
+    let result = step();
+    let Cost { accesses, retries } = meter(false).expect("it was started");
+    let did = DID.with(Cell::get);
+    assert!(opens.is_none() || retries == 0, "nobody interferes: {did:?}");
+    let most = (bound(units, did, opens) + RETRY * retries) * SHARE.get() / 100;
+    assert!(accesses <= most, "a step of {accesses} accesses, {most} are allowed: {did:?}");
+    let mut reached = REACHED.get();
+    let highest = &mut reached[did.stage as usize];
+    *highest = (*highest).max(100 * accesses / most);
+    REACHED.set(reached);
+    result
+}
+
+/// A worker alone, in pipelines of every kind and of one to six units: no retries, and no step costs
+/// more than the table says, which is at most four times too much.
+fn alone() {
+    REACHED.set([0; 4]);
+    check("cost::alone", None, 36, [()], |order| {
+        let entry = [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap][order % 3];
+        let broad_phase = [BroadPhase::Spatial, BroadPhase::Pairwise][order / 3 % 2];
+        let units = 1 + (order / 6) as u32;
+        let letters = true;
+        let setup = Setup { units, frames: 3, broad_phase, entry, letters, ..Setup::default() };
+        let (pipeline, world) = build(setup);
+        let mut worker = pipeline.worker();
+        let Ok(token) = pipeline.token(lend(Guarded::new(0))) else { panic!("a token is left") };
+        assert!(worker.hold(token).is_ok());
+        let mut entered = 0;
+        while !pipeline.finished() {
+            let opens = (entered + 1) % units == 0;
+            let did = step_alone(&mut worker, world, opens);
+            assert_ne!(did, Step::Idle, "nobody else has the work");
+            entered += u32::from(did == Step::Worked(Stage::BroadPhase));
+        }
+        verify(pipeline, world);
+    });
+    let reached = REACHED.get();
+    println!("cost::alone: highest share of the bound, by stage: {reached:?} %");
+    assert!(reached.iter().all(|&percent| percent > 25), "bounds that say little: {reached:?} %");
+}
+
+pub(crate) const ALL: &[Model] = &[("cost::alone", alone)];
