@@ -1,0 +1,112 @@
+//! Runs a virtual environment on shuttle's threads: workers sleep when they find nothing, leave and
+//! join while frames run, and hand the token on.
+
+use std::sync::atomic::Ordering;
+
+use dualframe_protocol::trace::{Event, Seen};
+use shuttle::rand::{Rng, thread_rng};
+use shuttle::sync::{Condvar, Mutex};
+
+use crate::dut::pipeline::Pipeline;
+use crate::dut::token::Token;
+use crate::dut::wait::{Bell, Epoch, Waiting};
+use crate::dut::worker::Step;
+use crate::record::{Host, Recorder, Screen, Setup, Slots};
+
+/// Sleeps on condition variables, for as long as it takes: shuttle reports a lost wake-up as a
+/// deadlock.
+#[derive(Default)]
+pub(crate) struct Park([(Mutex<()>, Condvar); 2]);
+
+impl Waiting for Park {
+    fn sleep(&self, bell: &Bell, seen: Epoch) {
+        let (room, awake) = &self.0[usize::from(bell.is_for_holders())];
+        let mut guard = room.lock().expect("no poison");
+        while !bell.rung_since(seen) {
+            guard = awake.wait(guard).expect("no poison");
+        }
+    }
+
+    fn wake(&self, bell: &Bell, count: u32) {
+        let (room, awake) = &self.0[usize::from(bell.is_for_holders())];
+        drop(room.lock().expect("no poison"));
+        (0..count.min(64)).for_each(|_| awake.notify_one());
+    }
+}
+
+type Machine<'a, W> = Pipeline<'a, Host<'a>, W>;
+type Shop<'p> = Mutex<Option<Token<'p, Screen>>>;
+
+/// Runs `setup` with `workers` workers and returns what was seen, and the units' values.
+pub(crate) fn run<W: Waiting>(setup: &Setup, workers: u32, waiting: W) -> (Vec<Seen>, Vec<u32>) {
+    let recorder = Recorder::default();
+    let mut slots = Slots::new(setup);
+    let mut pipeline = slots.pipeline(setup, waiting);
+    let token = pipeline.token(Screen).map_err(drop).expect("a token");
+    let shop: Shop<'_> = Mutex::new(Some(token));
+    shuttle::thread::scope(|scope| {
+        for worker in 0..workers {
+            let host = Host { setup, recorder: &recorder, worker, pause: let_others_run };
+            let (pipeline, shop) = (&pipeline, &shop);
+            scope.spawn(move || work(pipeline, shop, host));
+        }
+    });
+    drop(shop);
+    let values = pipeline.objects_mut().map(|body| body.value).collect();
+    drop(pipeline);
+    (recorder.into_record(), values)
+}
+
+/// One thread, from joining to leaving for good. The first one stays to the end.
+fn work<'p, 'a: 'p, W: Waiting>(pipeline: &'p Machine<'a, W>, shop: &Shop<'p>, mut host: Host<'a>) {
+    let mut dice = thread_rng();
+    while !pipeline.finished() {
+        let stays = host.worker == 0 || dice.gen_range(0..3) == 0;
+        let steps = if stays { u32::MAX } else { dice.gen_range(0..40) };
+        stint(pipeline, shop, &mut host, steps);
+        if dice.gen_range(0..2) == 0 && !stays {
+            return;
+        }
+    }
+}
+
+/// From joining to leaving, after `steps` steps or a few more: whoever has or sees the token stays.
+fn stint<'p, 'a: 'p, W: Waiting>(
+    pipeline: &'p Machine<'a, W>,
+    shop: &Shop<'p>,
+    host: &mut Host<'a>,
+    steps: u32,
+) {
+    let mut dice = thread_rng();
+    let (env, see) = (*host, |event| host.recorder.see(host.worker, event));
+    see(Event::Join);
+    let mut worker = pipeline.worker().probed(env);
+    let (mut stepped, mut holds) = (0, false);
+    while !pipeline.finished() && (stepped < steps || holds || shop.lock().unwrap().is_some()) {
+        stepped += 1;
+        if worker.step(&env).expect("memory for all") != Step::Idle {
+            if holds && dice.gen_range(0..24) == 0 {
+                see(Event::Release);
+                *shop.lock().unwrap() = worker.release();
+                holds = false;
+            }
+            continue;
+        }
+        // Whoever lays the token down is awake until someone has taken it.
+        let offered = if holds { None } else { shop.lock().unwrap().take() };
+        if let Some(token) = offered {
+            worker.hold(token).map_err(drop).expect("this pipeline's token");
+            see(Event::Hold);
+            holds = true;
+        } else {
+            worker.wait();
+        }
+    }
+    drop(worker);
+    see(Event::Leave);
+}
+
+/// A point at which shuttle may schedule another thread. No `yield_now`, which asks it to.
+fn let_others_run() {
+    shuttle::sync::atomic::AtomicBool::new(false).load(Ordering::SeqCst);
+}
