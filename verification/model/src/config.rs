@@ -43,7 +43,7 @@ pub enum Bug {
     DisplayedBeforeSwap,
     /// Whatever is queued for rendering is rendered, of whatever frame it is.
     RenderedAhead,
-    /// A queue hands out a work unit and keeps it.
+    /// A queue hands out a rendering and keeps it.
     QueueKeeps,
     /// A call to render rings the bell of those that cannot.
     WrongBell,

@@ -1,5 +1,7 @@
 //! A state of the protocol.
 
+use std::fmt;
+
 use crate::config::Config;
 use crate::work::{Work, Works, indices};
 
@@ -89,6 +91,8 @@ pub enum At {
         /// For good.
         gone: bool,
     },
+    /// Its step found nothing to do: it will sleep.
+    Idle,
     /// Has announced that it will sleep; rung since or not.
     Announced(bool),
     /// Has looked again and found nothing; rung since it announced itself or not.
@@ -259,5 +263,27 @@ impl State {
     pub fn tokens(&self, config: &Config) -> bool {
         let held = self.workers.iter().filter(|worker| worker.holds).count();
         held + self.tokens as usize <= config.tokens as usize
+    }
+}
+
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { queue, gate, renders, display, tokens, .. } = self;
+        writeln!(f, "    queued {queue:?}; frame {display} is on display, {renders} to render;")?;
+        writeln!(f, "    {gate} before the gate; {tokens} tokens lie about")?;
+        for (number, unit) in self.units.iter().enumerate() {
+            let Unit { frame, pending, rendered } = unit;
+            writeln!(
+                f,
+                "    unit {number}: next update is frame {frame}'s, waits for {pending}; \
+                 rendered {rendered} times"
+            )?;
+        }
+        for (number, worker) in self.workers.iter().enumerate() {
+            let Worker { at, carried, .. } = worker;
+            let token = if worker.holds { " with a token" } else { "" };
+            writeln!(f, "    worker {number}{token}: {at:?}, carries {carried:?}")?;
+        }
+        Ok(())
     }
 }

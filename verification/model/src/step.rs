@@ -136,7 +136,8 @@ impl<'c> Step<'c> {
     }
 
     fn take(&mut self, work: Work) {
-        if !self.worker().carried.take(work) && !self.config.has(Bug::QueueKeeps) {
+        let keeps = self.config.has(Bug::QueueKeeps) && matches!(work, Work::Render(_));
+        if !self.worker().carried.take(work) && !keeps {
             self.state.queue.take(work);
         }
         let at = match work {
@@ -211,7 +212,8 @@ impl<'c> Step<'c> {
 
     fn count(&mut self, pair: u8) {
         for end in self.config.ends(pair) {
-            self.state.unit(end).pending += 1;
+            let pending = &mut self.state.unit(end).pending;
+            *pending = pending.wrapping_add(1);
         }
     }
 

@@ -44,7 +44,8 @@ impl Step<'_> {
 
     pub(crate) fn go_waiting(&mut self) {
         let next = match self.at() {
-            At::Awake => At::Announced(false),
+            At::Awake => At::Idle,
+            At::Idle => At::Announced(false),
             At::Announced(_) if self.has_cause_to_wake() => At::Returning,
             At::Announced(rung) => At::Looked(rung),
             At::Looked(true) => At::Returning,
