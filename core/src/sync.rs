@@ -57,7 +57,7 @@ impl Site {
             site::SLOT_FIELD,
             site::FRAME_TAG,
         ];
-        if !UNDISTURBED.iter().any(|site| ::core::ptr::eq(site.name, self.name)) {
+        if !UNDISTURBED.iter().any(|site| site.name == self.name) {
             shuttle::sync::atomic::AtomicBool::new(false).load(Ordering::SeqCst);
         }
         self.order

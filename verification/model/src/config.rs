@@ -80,7 +80,7 @@ pub struct Config {
     pub late: u8,
     /// How many workers may leave.
     pub departures: u8,
-    /// Tokens; the first workers hold them.
+    /// Tokens; the first workers hold them, and those that are left over lie about.
     pub tokens: u8,
     /// How often a token may be given away.
     pub handovers: u8,

@@ -8,6 +8,7 @@
 
 pub mod config;
 pub mod model;
+pub mod replay;
 pub mod state;
 pub mod step;
 pub mod trace;

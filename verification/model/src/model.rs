@@ -42,7 +42,10 @@ impl Protocol {
                 carries.iter().for_each(|&carry| may(Act::Call { carry }));
             }
             At::Swapping => may(Act::Call { carry: false }),
-            At::Opening(..) | At::Interacted(_) | At::Advancing(_) | At::Rendered(_)
+            At::Opening(..)
+            | At::Interacted(_)
+            | At::Advancing(_)
+            | At::Rendered(_)
             | At::Reentering(_) => carries.iter().for_each(|&carry| may(Act::Go { carry })),
             At::Ringing | At::Leaving { .. } => self.rings(state, worker, &mut may),
             At::Asleep => {}
@@ -71,7 +74,7 @@ impl Protocol {
         if !me.carried.is_empty() && config.sleep {
             may(Act::Share);
         }
-        if state.departures > 0 && others > 0 && !me.holds && state.tokens == 0 {
+        if state.departures > 0 && others > 0 && !me.holds && !me.offers {
             may(Act::Leave);
         }
         if config.sleep && work.is_empty() && !me.offers {
@@ -96,10 +99,12 @@ impl Protocol {
                 workers.filter(|(_, worker)| worker.is_counted_asleep() && worker.holds == holders);
             of_bell.fold(0_u8, |bits, (number, _)| bits | 1 << number)
         };
-        let [others, holders] = [false, true].map(|holders| (counted(holders), call.woken(state, holders)));
-        for woken in 0..1_u8 << state.workers.len() {
-            let fits = |(of_bell, count): (u8, usize)| (woken & of_bell).count_ones() as usize == count;
-            if woken & !(others.0 | holders.0) == 0 && fits(others) && fits(holders) {
+        let [others, holders] =
+            [false, true].map(|holders| (counted(holders), call.woken(state, holders)));
+        let all = others.0 | holders.0;
+        for woken in (0..=all).filter(|woken| woken & !all == 0) {
+            let fits = |(bell, count): (u8, usize)| (woken & bell).count_ones() as usize == count;
+            if fits(others) && fits(holders) {
                 may(Act::Ring { woken });
             }
         }
@@ -184,7 +189,9 @@ impl Model for Protocol {
             Property::always(property::of(Rule::TwoFrames), |_, state: &State| {
                 state.broken != Some(Rule::TwoFrames)
             }),
-            Property::always(property::ACCESS, |model: &Self, state: &State| state.access(&model.0)),
+            Property::always(property::ACCESS, |model: &Self, state: &State| {
+                state.access(&model.0)
+            }),
             Property::always(property::TOKEN, |model: &Self, state: &State| {
                 state.broken != Some(Rule::Token) && state.tokens(&model.0)
             }),
@@ -208,4 +215,3 @@ impl Model for Protocol {
         ]
     }
 }
-

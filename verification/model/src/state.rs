@@ -182,9 +182,10 @@ impl State {
         let unit = Unit { frame: 0, pending: 1, rendered: 0 };
         let mut queue = Works::default();
         (0..config.units).for_each(|unit| _ = queue.put(Work::Enter(unit)));
+        let present = config.workers - config.late;
         let worker = |number| {
-            let present = number < config.workers - config.late;
-            Worker::new(if present { At::Awake } else { At::Outside }, number < config.tokens)
+            let at = if number < present { At::Awake } else { At::Outside };
+            Worker::new(at, number < config.tokens.min(present))
         };
         Self {
             units: vec![unit; config.units as usize],
@@ -196,7 +197,7 @@ impl State {
             gate: config.units,
             renders: config.units,
             display: 0,
-            tokens: 0,
+            tokens: config.tokens.saturating_sub(present),
             departures: config.departures,
             handovers: config.handovers,
             broken: None,

@@ -185,7 +185,8 @@ impl<'c> Step<'c> {
     }
 
     fn test(&mut self, pair: u8, near: bool) {
-        let [a, b] = self.config.pairs[pair as usize].map(|end| self.state.units[end as usize].frame);
+        let [a, b] =
+            self.config.pairs[pair as usize].map(|end| self.state.units[end as usize].frame);
         self.claim(Rule::Order, a == b);
         self.claim(Rule::ExactlyOnce, self.state.tests[pair as usize] == a);
         self.state.tests[pair as usize] += 1;
@@ -347,9 +348,8 @@ impl<'c> Step<'c> {
             At::Entering(unit) => {
                 self.state.arrived |= 1 << unit;
                 let arrived = self.state.arrived;
-                let here = |pair: &u32| {
-                    self.config.ends(*pair as u8).all(|end| arrived >> end & 1 == 1)
-                };
+                let here =
+                    |pair: &u32| self.config.ends(*pair as u8).all(|end| arrived >> end & 1 == 1);
                 let met = indices(self.config.pairs_of(unit)).filter(here);
                 let met = met.fold(0, |bits, pair| bits | 1 << pair);
                 self.goes_to(At::Testing(unit, met));
@@ -399,7 +399,8 @@ impl<'c> Step<'c> {
             self.then(then);
             return;
         }
-        if !self.config.has(Bug::ArrivalsClearedLate) && self.config.broad_phase == BroadPhase::Spatial
+        if !self.config.has(Bug::ArrivalsClearedLate)
+            && self.config.broad_phase == BroadPhase::Spatial
         {
             self.state.arrived = 0;
         }

@@ -40,7 +40,7 @@ pub enum Event {
     /// A frame was swapped.
     Swap(u32),
     /// The worker is done with its work unit.
-    End(u32),
+    End,
 }
 
 /// What a worker was seen to do.

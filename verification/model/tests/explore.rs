@@ -29,9 +29,10 @@ fn explore(config: Config) {
     let (states, transitions) = (checker.unique_state_count(), checker.state_count());
     let seconds = start.elapsed().as_secs_f64();
     println!("{name}: {states} states, {transitions} transitions, {seconds:.1} s");
-    let failed = checker.discoveries().into_iter().find(|(name, _)| {
-        checker.model().property(name).expectation.discovery_is_failure()
-    });
+    let failed = checker
+        .discoveries()
+        .into_iter()
+        .find(|(name, _)| checker.model().property(name).expectation.discovery_is_failure());
     if let Some((name, way)) = failed {
         panic!("{name} is broken by {:#?}\n{}", way.clone().into_actions(), way.last_state());
     }
@@ -96,7 +97,10 @@ fn a_solitary_unit_and_one_within_itself() {
     for entry in [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap] {
         explore(Config { entry, ..config.clone() });
     }
-    explore(Config { frames: 2, ..coming_and_going(Config { sleep: true, ..config }, Entry::AfterUpdate) });
+    explore(Config {
+        frames: 2,
+        ..coming_and_going(Config { sleep: true, ..config }, Entry::AfterUpdate)
+    });
 }
 
 /// Three workers, three units, two interactions, three frames, and all that may happen.

@@ -11,7 +11,8 @@ fn breaks(bug: Bug, config: Config, expected: &str) {
     let model = Protocol(Config { bug: Some(bug), ..config });
     let found = model.checker().finish_when(HasDiscoveries::AnyFailures).spawn_bfs().join();
     let discoveries = found.discoveries();
-    let is_failure = |name: &&'static str| found.model().property(name).expectation.discovery_is_failure();
+    let is_failure =
+        |name: &&'static str| found.model().property(name).expectation.discovery_is_failure();
     let mut broken: Vec<_> = discoveries.keys().copied().filter(is_failure).collect();
     broken.sort_by_key(|name| discoveries[name].clone().into_actions().len());
     let states = found.unique_state_count();

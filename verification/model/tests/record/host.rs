@@ -3,6 +3,7 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use dualframe_protocol::config::{self, Config};
 use dualframe_protocol::trace::{Event, Seen, Task};
 
 use crate::dut::contacts::Contacts;
@@ -41,6 +42,26 @@ pub(crate) fn draw(seed: u64, about: &[u32]) -> u64 {
 }
 
 impl Setup {
+    /// The model of this run.
+    pub(crate) fn model(&self) -> Config {
+        let pairs: Vec<_> = self.pairs().iter().map(|pair| pair.map(|unit| unit as u8)).collect();
+        let solitary = (0..self.units).filter(|&unit| self.is_solitary(unit));
+        Config {
+            broad_phase: match self.broad_phase {
+                BroadPhase::Spatial => config::BroadPhase::Spatial,
+                BroadPhase::Pairwise => config::BroadPhase::Pairwise,
+            },
+            entry: match self.entry {
+                Entry::AfterUpdate => config::Entry::AfterUpdate,
+                Entry::AfterRender => config::Entry::AfterRender,
+                Entry::AfterSwap => config::Entry::AfterSwap,
+            },
+            tokens: self.tokens as u8,
+            solitary: solitary.fold(0, |bits, unit| bits | 1 << unit),
+            ..Config::new(1, self.units as u8, &pairs, self.frames as u8)
+        }
+    }
+
     pub(crate) fn is_solitary(&self, unit: u32) -> bool {
         match self.broad_phase {
             BroadPhase::Spatial => self.solitary >> unit & 1 == 1,
@@ -131,7 +152,8 @@ impl Recorder {
                 continue;
             };
             let by_worker = record[at + 1..].iter().find(|seen| seen.worker == worker);
-            if let Some(Seen { event: Event::Call(Task::Interact { ends, .. }, _), .. }) = by_worker {
+            if let Some(Seen { event: Event::Call(Task::Interact { ends, .. }, _), .. }) = by_worker
+            {
                 let ends = *ends;
                 if let Event::Begin(task, _) = &mut record[at].event {
                     *task = Task::Interact { ends, slot };
@@ -266,7 +288,7 @@ impl Probe for Host<'_> {
         self.see(Event::Begin(task, frame.0));
     }
 
-    fn end(&mut self, _: Work, frame: Frame) {
-        self.see(Event::End(frame.0));
+    fn end(&mut self, _: Work, _: Frame) {
+        self.see(Event::End);
     }
 }

@@ -87,7 +87,10 @@ impl Places {
                 assert!(self.renders[at(frame - 1, unit)] < update, "unit {unit} in {frame}");
                 assert!(self.swaps[frame as usize - 1] < render, "unit {unit} in {frame}");
             }
-            assert!(frame < 2 || self.swaps[frame as usize - 2] < update, "frame {frame} ran ahead");
+            assert!(
+                frame < 2 || self.swaps[frame as usize - 2] < update,
+                "frame {frame} ran ahead"
+            );
         }
     }
 }

@@ -1,20 +1,17 @@
-//! Runs a virtual environment on shuttle's threads: workers sleep when they find nothing, leave and
-//! join while frames run, and hand the token on.
-
-use std::sync::atomic::Ordering;
+//! Runs a virtual environment on threads: workers sleep when they find nothing, leave and join while
+//! frames run, and hand tokens on. Each test binary says what threads these are by `os`.
 
 use dualframe_protocol::trace::{Event, Seen};
-use shuttle::rand::{Rng, thread_rng};
-use shuttle::sync::{Condvar, Mutex};
 
 use crate::dut::pipeline::Pipeline;
 use crate::dut::token::Token;
 use crate::dut::wait::{Bell, Epoch, Waiting};
 use crate::dut::worker::Step;
-use crate::record::{Host, Recorder, Screen, Setup, Slots};
+use crate::os::{self, Condvar, Mutex};
 
-/// Sleeps on condition variables, for as long as it takes: shuttle reports a lost wake-up as a
-/// deadlock.
+use super::{Host, Recorder, Screen, Setup, Slots};
+
+/// Sleeps on condition variables, for as long as it takes: a wake-up that is lost is a hang.
 #[derive(Default)]
 pub(crate) struct Park([(Mutex<()>, Condvar); 2]);
 
@@ -35,20 +32,24 @@ impl Waiting for Park {
 }
 
 type Machine<'a, W> = Pipeline<'a, Host<'a>, W>;
-type Shop<'p> = Mutex<Option<Token<'p, Screen>>>;
+/// Tokens that no worker holds.
+type Shop<'p> = Mutex<Vec<Token<'p, Screen>>>;
 
 /// Runs `setup` with `workers` workers and returns what was seen, and the units' values.
 pub(crate) fn run<W: Waiting>(setup: &Setup, workers: u32, waiting: W) -> (Vec<Seen>, Vec<u32>) {
     let recorder = Recorder::default();
     let mut slots = Slots::new(setup);
     let mut pipeline = slots.pipeline(setup, waiting);
-    let token = pipeline.token(Screen).map_err(drop).expect("a token");
-    let shop: Shop<'_> = Mutex::new(Some(token));
-    shuttle::thread::scope(|scope| {
+    let token = |_| pipeline.token(Screen).map_err(drop).expect("a token");
+    let shop: Shop<'_> = Mutex::new((0..setup.tokens).map(token).collect());
+    os::scope(|scope| {
         for worker in 0..workers {
-            let host = Host { setup, recorder: &recorder, worker, pause: let_others_run };
+            let host = Host { setup, recorder: &recorder, worker, pause: os::let_others_run };
             let (pipeline, shop) = (&pipeline, &shop);
-            scope.spawn(move || work(pipeline, shop, host));
+            scope.spawn(move || {
+                let _alarm = os::alarm();
+                work(pipeline, shop, host);
+            });
         }
     });
     drop(shop);
@@ -59,12 +60,11 @@ pub(crate) fn run<W: Waiting>(setup: &Setup, workers: u32, waiting: W) -> (Vec<S
 
 /// One thread, from joining to leaving for good. The first one stays to the end.
 fn work<'p, 'a: 'p, W: Waiting>(pipeline: &'p Machine<'a, W>, shop: &Shop<'p>, mut host: Host<'a>) {
-    let mut dice = thread_rng();
     while !pipeline.finished() {
-        let stays = host.worker == 0 || dice.gen_range(0..3) == 0;
-        let steps = if stays { u32::MAX } else { dice.gen_range(0..40) };
+        let stays = host.worker == 0 || os::below(3) == 0;
+        let steps = if stays { u32::MAX } else { os::below(40) };
         stint(pipeline, shop, &mut host, steps);
-        if dice.gen_range(0..2) == 0 && !stays {
+        if os::below(2) == 0 && !stays {
             return;
         }
     }
@@ -77,23 +77,22 @@ fn stint<'p, 'a: 'p, W: Waiting>(
     host: &mut Host<'a>,
     steps: u32,
 ) {
-    let mut dice = thread_rng();
     let (env, see) = (*host, |event| host.recorder.see(host.worker, event));
     see(Event::Join);
     let mut worker = pipeline.worker().probed(env);
     let (mut stepped, mut holds) = (0, false);
-    while !pipeline.finished() && (stepped < steps || holds || shop.lock().unwrap().is_some()) {
+    while !pipeline.finished() && (stepped < steps || holds || !is_empty(shop)) {
         stepped += 1;
         if worker.step(&env).expect("memory for all") != Step::Idle {
-            if holds && dice.gen_range(0..24) == 0 {
+            if holds && os::below(24) == 0 {
                 see(Event::Release);
-                *shop.lock().unwrap() = worker.release();
+                shop.lock().expect("no poison").extend(worker.release());
                 holds = false;
             }
             continue;
         }
         // Whoever lays the token down is awake until someone has taken it.
-        let offered = if holds { None } else { shop.lock().unwrap().take() };
+        let offered = if holds { None } else { shop.lock().expect("no poison").pop() };
         if let Some(token) = offered {
             worker.hold(token).map_err(drop).expect("this pipeline's token");
             see(Event::Hold);
@@ -106,7 +105,6 @@ fn stint<'p, 'a: 'p, W: Waiting>(
     see(Event::Leave);
 }
 
-/// A point at which shuttle may schedule another thread. No `yield_now`, which asks it to.
-fn let_others_run() {
-    shuttle::sync::atomic::AtomicBool::new(false).load(Ordering::SeqCst);
+fn is_empty(shop: &Shop<'_>) -> bool {
+    shop.lock().expect("no poison").is_empty()
 }
