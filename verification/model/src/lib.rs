@@ -9,6 +9,7 @@
 pub mod config;
 pub mod model;
 pub mod replay;
+mod stages;
 pub mod state;
 pub mod step;
 pub mod trace;

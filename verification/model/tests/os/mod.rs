@@ -3,7 +3,7 @@
 pub(crate) use std::sync::{Condvar, Mutex};
 pub(crate) use std::thread::scope;
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::hash::{BuildHasher, RandomState};
 
 /// Now and then the processor is given away in the middle of a callback.
 pub(crate) fn let_others_run() {
@@ -14,10 +14,8 @@ pub(crate) fn let_others_run() {
 
 /// Any number below `bound`; no two runs are the same anyway.
 pub(crate) fn below(bound: u32) -> u32 {
-    static DRAWN: AtomicU32 = AtomicU32::new(0);
-    // Relaxed: any two draws differ, and nothing else follows from them.
-    let drawn = DRAWN.fetch_add(1, Ordering::Relaxed);
-    (crate::record::draw(1, &[drawn]) % u64::from(bound)) as u32
+    let drawn = RandomState::new().hash_one(());
+    (drawn % u64::from(bound)) as u32
 }
 
 /// Ends the process if its thread panics: the others would wait for what it carried.

@@ -32,7 +32,7 @@ pub(crate) struct Setup {
 }
 
 /// A hash of a few numbers (splitmix64's finaliser over each).
-pub(crate) fn draw(seed: u64, about: &[u32]) -> u64 {
+fn draw(seed: u64, about: &[u32]) -> u64 {
     about.iter().fold(seed, |state, &word| {
         let mut z = (state ^ u64::from(word)).wrapping_add(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -78,7 +78,8 @@ impl Setup {
                 all.filter(|pair| pair.iter().all(|&unit| self.solitary >> unit & 1 == 0)).collect()
             }
             BroadPhase::Pairwise => {
-                let modelled = |[a, b]: &[u32; 2]| a != b && draw(self.seed, &[*a, *b]) % 2 == 0;
+                let modelled =
+                    |[a, b]: &[u32; 2]| a != b && draw(self.seed, &[*a, *b]).is_multiple_of(2);
                 all.filter(modelled).collect()
             }
         }

@@ -1,13 +1,14 @@
 //! A small virtual environment on the real core, whose callbacks and probe record what they see, and
 //! what must hold of the record. Each test binary that uses it says which build of the core is meant
 //! by `dut`, and which threads by `os`.
+#![allow(dead_code, reason = "each test binary uses some of it")]
 
 mod drive;
 mod host;
 mod judge;
 
 pub(crate) use drive::{Park, run};
-pub(crate) use host::{Body, Host, Recorder, Screen, Setup, draw};
+pub(crate) use host::{Body, Host, Recorder, Screen, Setup};
 pub(crate) use judge::judge;
 
 use crate::dut::contacts::{ContactSlot, SegmentSlot};
