@@ -24,6 +24,10 @@ pub struct Refused {
     pub step: usize,
     /// What was seen there.
     pub seen: Option<Seen>,
+    /// Which of the workers below that was: whoever joins again is another one.
+    pub worker: Option<u8>,
+    /// What was seen just before.
+    pub before: Vec<Seen>,
     /// Where the protocol stood.
     pub state: String,
 }
@@ -31,10 +35,15 @@ pub struct Refused {
 impl fmt::Display for Refused {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.seen {
-            Some(seen) => writeln!(f, "step {}, {seen:?}, is not allowed at", self.step)?,
+            Some(seen) => {
+                writeln!(f, "step {}, {seen:?}, is not allowed at", self.step)?;
+                self.worker
+                    .map_or(Ok(()), |worker| writeln!(f, "    (it is worker {worker} here)"))?;
+            }
             None => writeln!(f, "the run ended after {} steps, unfinished, at", self.step)?,
         }
-        f.write_str(&self.state)
+        writeln!(f, "{}after", self.state)?;
+        self.before.iter().try_for_each(|seen| writeln!(f, "    {seen:?}"))
     }
 }
 
@@ -88,8 +97,7 @@ pub fn replay(config: &Config, record: &[Seen]) -> Result<Replayed, Refused> {
         let next: HashSet<_> = allowed.filter_map(|state| replay.after(state, seen)).collect();
         states = next.into_iter().collect();
         if states.is_empty() {
-            let state = possible.first().map(State::to_string).unwrap_or_default();
-            return Err(Refused { step, seen: Some(seen), state });
+            return Err(replay.refusal(step, record, &possible));
         }
     }
     let possible = replay.possible(states);
@@ -100,8 +108,7 @@ pub fn replay(config: &Config, record: &[Seen]) -> Result<Replayed, Refused> {
     if replay.busy.is_empty() && possible.iter().any(is_over) {
         return Ok(replayed);
     }
-    let state = possible.first().map(State::to_string).unwrap_or_default();
-    Err(Refused { step: record.len(), seen: None, state })
+    Err(replay.refusal(record.len(), record, &possible))
 }
 
 struct Replay {
@@ -133,6 +140,14 @@ fn is_unseen(at: At) -> bool {
 }
 
 impl Replay {
+    fn refusal(&self, step: usize, record: &[Seen], possible: &[State]) -> Refused {
+        let seen = record.get(step).copied();
+        let worker = seen.and_then(|seen| self.workers.get(&seen.worker).copied());
+        let before = record[step.saturating_sub(5)..step].to_vec();
+        let state = possible.first().map(State::to_string).unwrap_or_default();
+        Refused { step, seen, worker, before, state }
+    }
+
     /// Keeps account of who is who; `false` if a work unit begins within another, or ends before it
     /// has begun.
     fn follow(&mut self, seen: Seen) -> bool {

@@ -43,7 +43,7 @@ fn refused(name: &str, change: impl Fn(&mut Vec<Seen>, usize) -> Option<()>) {
                 let Err(refusal) = replay(&config, &changed) else {
                     panic!("{name} at step {at}, {:?}: not refused", record[at]);
                 };
-                if changes == 0 {
+                if changes == 50 {
                     println!("{name} at step {at}, {:?}:\n{refusal}", record[at]);
                 }
                 changes += 1;
@@ -51,7 +51,7 @@ fn refused(name: &str, change: impl Fn(&mut Vec<Seen>, usize) -> Option<()>) {
         }
     }
     println!("{name}: {changes} changes, all refused");
-    assert!(changes > 20, "next to nothing was changed");
+    assert!(changes > 50, "next to nothing was changed");
 }
 
 #[test]

@@ -11,6 +11,8 @@ mod record;
 use std::fs;
 use std::panic::catch_unwind;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use dut::frame::Entry;
@@ -37,16 +39,22 @@ fn setup((broad_phase, entry): (BroadPhase, Entry)) -> Setup {
 /// Runs `schedules` schedules of `scheduler`'s making in each way, and asserts that it did.
 fn explore<S: Scheduler + 'static>(name: &str, schedules: usize, scheduler: impl Fn(usize) -> S) {
     let start = Instant::now();
+    let points = Arc::new(AtomicUsize::new(0));
     for way in WAYS {
         let setup = setup(way);
+        let sum = Arc::clone(&points);
         let explored = Runner::new(scheduler(schedules), Config::default()).run(move || {
             let (record, values) = run(&setup, 4, Park::default());
             judge(&setup, &record, &values);
+            sum.fetch_add(shuttle::current::context_switches(), Ordering::Relaxed);
         });
         assert_eq!(explored, schedules, "{name}, {way:?}");
     }
     let all = WAYS.len() * schedules;
-    println!("{name}: {all} schedules, {:.1} s", start.elapsed().as_secs_f64());
+    let points = points.load(Ordering::Relaxed) / all;
+    let seconds = start.elapsed().as_secs_f64();
+    println!("{name}: {all} schedules, each of {points} points of choice, {seconds:.1} s");
+    assert!(points > 1000, "next to nothing was interleaved");
 }
 
 /// Schedules that take any thread at each point.
