@@ -43,11 +43,11 @@ fn conform(cases: u32) {
     let config = ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() };
     proptest!(config, |((setup, workers) in setups())| {
         let (record, values) = run(&setup, workers, Park::default());
-        judge(&setup, &record, &values);
         match replay(&setup.model(), &record) {
             Ok(replayed) => count(replayed),
             Err(refused) => return Err(TestCaseError::fail(refused.to_string())),
         }
+        judge(&setup, &record, &values);
     });
     let [runs, steps, states] = REPLAYED.get();
     println!("{runs} runs, {steps} steps replayed, at most {states} states in mind at once");

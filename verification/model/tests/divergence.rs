@@ -73,6 +73,10 @@ fn a_doubled_step() {
 #[test]
 fn a_step_of_another_worker() {
     refused("another worker's", |record, at| {
+        // Of two units that enter at once, either may be the later one, and test.
+        if matches!(record[at].event, Event::Test(..)) {
+            return None;
+        }
         record[at].worker = (record[at].worker + 1) % 3;
         Some(())
     });

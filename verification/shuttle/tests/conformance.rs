@@ -17,7 +17,33 @@ use record::{Park, Setup, judge, run};
 use shuttle::scheduler::{PctScheduler, RandomScheduler, Scheduler};
 use shuttle::{Config, Runner};
 
-/// Runs and replays `schedules` schedules in each way of running.
+/// Every way of running, with one token or two; with two there is a solitary unit, too.
+fn setups() -> impl Iterator<Item = Setup> {
+    let entries = [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap];
+    let ways = [BroadPhase::Spatial, BroadPhase::Pairwise]
+        .into_iter()
+        .flat_map(move |broad_phase| entries.map(|entry| (broad_phase, entry)))
+        .flat_map(|way| [1, 2].map(|tokens| (way, tokens)));
+    (1..).zip(ways).map(|(seed, ((broad_phase, entry), tokens))| {
+        let (units, frames, near_percent) = (5, 3, 40);
+        let solitary = if tokens == 2 { 4 } else { 0 };
+        Setup { units, frames, broad_phase, entry, tokens, seed, near_percent, solitary }
+    })
+}
+
+/// Runs `setup` and replays what was seen; returns the number of steps.
+fn replayed(setup: &Setup) -> usize {
+    let (record, values) = run(setup, 4, Park::default());
+    match replay(&setup.model(), &record) {
+        Ok(replayed) => {
+            judge(setup, &record, &values);
+            replayed.steps
+        }
+        Err(refused) => panic!("{refused}"),
+    }
+}
+
+/// Replays `schedules` schedules of each setup.
 fn conform<S: Scheduler + 'static>(
     name: &str,
     schedules: usize,
@@ -25,43 +51,16 @@ fn conform<S: Scheduler + 'static>(
 ) {
     let start = Instant::now();
     let steps = Arc::new(AtomicUsize::new(0));
-    let mut seed = 0;
-    for broad_phase in [BroadPhase::Spatial, BroadPhase::Pairwise] {
-        for entry in [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap] {
-            for tokens in [1, 2] {
-                seed += 1;
-                let (units, frames, near_percent) = (5, 3, 40);
-                let solitary = if tokens == 2 { 4 } else { 0 };
-                let setup = Setup {
-                    units,
-                    frames,
-                    broad_phase,
-                    entry,
-                    tokens,
-                    seed,
-                    near_percent,
-                    solitary,
-                };
-                let steps = Arc::clone(&steps);
-                let explored =
-                    Runner::new(scheduler(schedules, seed), Config::default()).run(move || {
-                        let (record, values) = run(&setup, 4, Park::default());
-                        judge(&setup, &record, &values);
-                        match replay(&setup.model(), &record) {
-                            Ok(replayed) => _ = steps.fetch_add(replayed.steps, Ordering::Relaxed),
-                            Err(refusal) => panic!("{refusal}"),
-                        }
-                    });
-                assert_eq!(explored, schedules);
-            }
-        }
+    let mut traces = 0;
+    for setup in setups() {
+        let steps = Arc::clone(&steps);
+        let runner = Runner::new(scheduler(schedules, setup.seed), Config::default());
+        traces += runner.run(move || _ = steps.fetch_add(replayed(&setup), Ordering::Relaxed));
     }
-    let (all, steps) = (12 * schedules, steps.load(Ordering::Relaxed));
-    println!(
-        "{name}: {all} traces, {steps} steps replayed, {:.1} s",
-        start.elapsed().as_secs_f64()
-    );
-    assert!(steps > 100 * all, "next to nothing was replayed");
+    let (steps, seconds) = (steps.load(Ordering::Relaxed), start.elapsed().as_secs_f64());
+    println!("{name}: {traces} traces, {steps} steps replayed, {seconds:.1} s");
+    assert_eq!(traces, 12 * schedules);
+    assert!(steps > 100 * traces, "next to nothing was replayed");
 }
 
 fn random(schedules: usize) {

@@ -62,28 +62,28 @@ pub(crate) fn run<W: Waiting>(setup: &Setup, workers: u32, waiting: W) -> (Vec<S
 fn work<'p, 'a: 'p, W: Waiting>(pipeline: &'p Machine<'a, W>, shop: &Shop<'p>, mut host: Host<'a>) {
     while !pipeline.finished() {
         let stays = host.worker == 0 || os::below(3) == 0;
-        let steps = if stays { u32::MAX } else { os::below(40) };
-        stint(pipeline, shop, &mut host, steps);
-        if os::below(2) == 0 && !stays {
+        stint(pipeline, shop, &mut host, stays);
+        if !stays && os::below(2) == 0 {
             return;
         }
     }
 }
 
-/// From joining to leaving, after `steps` steps or a few more: whoever has or sees the token stays.
+/// From joining to leaving: often when it has just been woken, and is counted on. Whoever holds a
+/// token, or sees one lie about, stays meanwhile.
 fn stint<'p, 'a: 'p, W: Waiting>(
     pipeline: &'p Machine<'a, W>,
     shop: &Shop<'p>,
     host: &mut Host<'a>,
-    steps: u32,
+    stays: bool,
 ) {
     let (env, see) = (*host, |event| host.recorder.see(host.worker, event));
     see(Event::Join);
     let mut worker = pipeline.worker().probed(env);
-    let (mut stepped, mut holds) = (0, false);
-    while !pipeline.finished() && (stepped < steps || holds || !is_empty(shop)) {
-        stepped += 1;
+    let (mut holds, mut tired) = (false, false);
+    while !pipeline.finished() && (stays || !tired || holds || !is_empty(shop)) {
         if worker.step(&env).expect("memory for all") != Step::Idle {
+            tired = os::below(32) == 0;
             if holds && os::below(24) == 0 {
                 see(Event::Release);
                 shop.lock().expect("no poison").extend(worker.release());
@@ -99,6 +99,7 @@ fn stint<'p, 'a: 'p, W: Waiting>(
             holds = true;
         } else {
             worker.wait();
+            tired = os::below(3) == 0;
         }
     }
     drop(worker);
