@@ -247,8 +247,11 @@ impl Replay {
             }
             Event::End => return (me.at == At::Awake).then(|| state.clone()),
         };
-        let allowed = self.acts(state, worker).contains(&(worker, act));
-        allowed.then(|| self.made(state, (worker, act))).flatten()
+        // Somebody may have taken its token and not have been seen to hold it yet.
+        let mut state = state.clone();
+        state.workers[worker as usize].offers &= act != Act::Leave;
+        let allowed = self.acts(&state, worker).contains(&(worker, act));
+        allowed.then(|| self.made(&state, (worker, act))).flatten()
     }
 
     fn work(&self, task: Task) -> Option<Work> {

@@ -62,5 +62,5 @@ fn traces_are_the_models() {
 #[test]
 #[ignore = "minutes, see README.md"]
 fn traces_are_the_models_full() {
-    conform(100_000);
+    conform(20_000);
 }
