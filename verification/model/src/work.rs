@@ -72,12 +72,6 @@ impl Works {
         found
     }
 
-    /// Those of both.
-    #[must_use]
-    pub fn union(self, others: Self) -> Self {
-        Self(self.0 | others.0)
-    }
-
     /// All of them, in a fixed order.
     pub fn iter(self) -> impl Iterator<Item = Work> {
         indices(self.0).map(Work::of_bit)
