@@ -62,5 +62,5 @@ fn traces_are_the_models() {
 #[test]
 #[ignore = "minutes, see README.md"]
 fn traces_are_the_models_full() {
-    conform(20_000);
+    conform(100_000);
 }
