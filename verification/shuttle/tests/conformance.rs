@@ -14,8 +14,8 @@ use dualframe_protocol::replay::replay;
 use dut::frame::Entry;
 use dut::pipeline::BroadPhase;
 use record::{Park, Setup, judge, run};
+use shuttle::Runner;
 use shuttle::scheduler::{PctScheduler, RandomScheduler, Scheduler};
-use shuttle::{Config, Runner};
 
 /// Every way of running, with one token or two; with two there is a solitary unit, too.
 fn setups() -> impl Iterator<Item = Setup> {
@@ -54,7 +54,7 @@ fn conform<S: Scheduler + 'static>(
     let mut traces = 0;
     for setup in setups() {
         let steps = Arc::clone(&steps);
-        let runner = Runner::new(scheduler(schedules, setup.seed), Config::default());
+        let runner = Runner::new(scheduler(schedules, setup.seed), os::config());
         traces += runner.run(move || _ = steps.fetch_add(replayed(&setup), Ordering::Relaxed));
     }
     let (steps, seconds) = (steps.load(Ordering::Relaxed), start.elapsed().as_secs_f64());

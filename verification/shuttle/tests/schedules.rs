@@ -20,8 +20,8 @@ use dut::pipeline::BroadPhase;
 use dut::wait::{Bell, Epoch, Waiting};
 use os::{Condvar, Mutex};
 use record::{Park, Setup, judge, run};
-use shuttle::scheduler::{PctScheduler, RandomScheduler, Scheduler};
-use shuttle::{Config, FailurePersistence, Runner};
+use shuttle::scheduler::{PctScheduler, RandomScheduler, ReplayScheduler, Scheduler};
+use shuttle::{FailurePersistence, Runner};
 
 /// The ways of running among which the schedules are divided.
 const WAYS: [(BroadPhase, Entry); 4] = [
@@ -43,7 +43,7 @@ fn explore<S: Scheduler + 'static>(name: &str, schedules: usize, scheduler: impl
     for way in WAYS {
         let setup = setup(way);
         let sum = Arc::clone(&points);
-        let explored = Runner::new(scheduler(schedules), Config::default()).run(move || {
+        let explored = Runner::new(scheduler(schedules), os::config()).run(move || {
             let (record, values) = run(&setup, 4, Park::default());
             judge(&setup, &record, &values);
             sum.fetch_add(shuttle::current::context_switches(), Ordering::Relaxed);
@@ -136,7 +136,7 @@ fn a_lost_wake_up_is_found_and_replayed() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("lost_wake_up");
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(&folder).expect("a folder for the schedule");
-    let mut config = Config::default();
+    let mut config = os::config();
     config.failure_persistence = FailurePersistence::File(Some(folder.clone()));
     let found = catch_unwind(move || {
         Runner::new(RandomScheduler::new_from_seed(3, 5000), config).run(hasty);
@@ -147,7 +147,10 @@ fn a_lost_wake_up_is_found_and_replayed() {
     let schedule = file.expect("a schedule").path();
     let length = fs::read_to_string(&schedule).expect("a schedule").len();
     println!("found; the schedule that shuttle would print has {length} characters");
-    let again = catch_unwind(move || shuttle::replay_from_file(hasty, schedule));
+    let again = catch_unwind(move || {
+        let kept = ReplayScheduler::new_from_file(schedule).expect("a schedule");
+        Runner::new(kept, os::config()).run(hasty);
+    });
     let again = said(&*again.expect_err("the schedule did not find the bug again"));
     assert!(again.contains("deadlock"), "failed for another reason: {again}");
 }
