@@ -134,6 +134,11 @@ impl Config {
         pairs.filter(|(_, ends)| ends.contains(&unit)).fold(0, |bits, (pair, _)| bits | 1 << pair)
     }
 
+    /// The pair of `unit` with itself.
+    pub(crate) fn pair_within(&self, unit: u8) -> Option<u8> {
+        self.pairs.iter().position(|&ends| ends == [unit; 2]).map(|pair| pair as u8)
+    }
+
     /// The distinct ends of a pair.
     pub(crate) fn ends(&self, pair: u8) -> impl Iterator<Item = u8> + use<> {
         let [a, b] = self.pairs[pair as usize];

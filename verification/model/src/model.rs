@@ -27,6 +27,12 @@ impl Protocol {
             At::Outside if state.finished(config) => {}
             At::Outside => may(Act::Join),
             At::Awake => self.awake(state, worker, &mut may),
+            At::Entering(unit) => {
+                // Whether a unit asks about itself before or after it arrives is all one.
+                let itself = config.pair_within(unit).filter(|&pair| state.is_due(unit, pair));
+                itself.into_iter().for_each(|pair| self.tests(pair, &mut may));
+                may(Act::Go { carry: false });
+            }
             At::Testing(_, left) => {
                 indices(left).for_each(|pair| self.tests(pair as u8, &mut may));
             }

@@ -172,7 +172,10 @@ impl Step<'_> {
                 let arrived = self.state.arrived;
                 let here =
                     |pair: &u32| self.config.ends(*pair as u8).all(|end| arrived >> end & 1 == 1);
-                let met = indices(self.config.pairs_of(unit)).filter(here);
+                let within = self.config.pair_within(unit).map(u32::from);
+                let due =
+                    |pair: &u32| Some(*pair) != within || self.state.is_due(unit, *pair as u8);
+                let met = indices(self.config.pairs_of(unit)).filter(here).filter(due);
                 let met = met.fold(0, |bits, pair| bits | 1 << pair);
                 self.goes_to(At::Testing(unit, met));
                 self.leave_if_tested();

@@ -234,6 +234,11 @@ impl State {
         self.units[unit as usize].frame == self.display + 1
     }
 
+    /// Whether `pair` is still to be tested in the frame that `unit` enters.
+    pub(crate) fn is_due(&self, unit: u8, pair: u8) -> bool {
+        self.tests[pair as usize] == self.units[unit as usize].frame
+    }
+
     /// Invariant 5: nobody else has a unit that is updated.
     pub fn access(&self, config: &Config) -> bool {
         let writes = |worker: &Worker| match worker.at {
@@ -241,6 +246,7 @@ impl State {
             _ => 0,
         };
         let reads = |worker: &Worker| match worker.at {
+            At::Entering(unit) => 1 << unit,
             At::Testing(_, pairs) => {
                 let ends = indices(pairs).flat_map(|pair| config.ends(pair as u8));
                 ends.fold(0, |bits, end| bits | 1_u64 << end)
