@@ -80,7 +80,7 @@ impl Environment for Line {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     const UNITS: usize = 4;
     const CANDIDATES: usize = 2 * UNITS * (UNITS - 1) / 2;
-    const QUEUES: usize = queue_slots(UNITS, CANDIDATES, 1);
+    const QUEUES: usize = queue_slots(UNITS, CANDIDATES, 1, 1);
     let memory = Memory {
         units: &mut [0.0, 0.25, 0.5, 0.75].map(UnitSlot::new),
         interactions: &mut [const { InteractionSlot::spare(()) }; CANDIDATES],

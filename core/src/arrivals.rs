@@ -1,83 +1,73 @@
 //! Who has arrived in this frame: each pair meets exactly once, at its second arriver.
 //!
-//! A unit arrives by one CAS that pushes it onto the frame's list; the head that it replaced *is*
-//! the list of those it must be tested against. Of any two units one pushed later, and only that
-//! one finds the other in its list: every pair meets exactly once, with no gate, no sort and no
-//! wait. One word serves any number of units, where a set of bits would need a word for every
-//! pair of groups beyond the word's width; and it is cleared by one store.
+//! A unit arrives by one CAS that writes it into the first free cell of the frame's list; the cells
+//! before it *are* the list of those it must be tested against. Of any two units one comes later in
+//! the list, and only that one finds the other before it: every pair meets exactly once, with no gate,
+//! no sort and no wait. Cells are words side by side, so that a long list is read as fast as memory
+//! gives it, where links from unit to unit would be followed one miss after the other; and any number
+//! of units fits, where a set of bits would need a word for every pair of groups beyond the word's
+//! width.
+//!
+//! No state is half written: the CAS publishes, then anyone may help the end of the list on.
 
 use crossbeam_utils::CachePadded;
 
-use crate::sync::{Atomic, const_fn, site, spin_hint};
-use crate::unit::NONE;
+use crate::frame::Frame;
+use crate::ring::QueueSlot;
+use crate::sync::{AtomicWord, site, spin_hint};
 
-/// A unit's place in the list of arrivals.
+/// The frame's arrivals. A cell holds a unit's index and, in its lowest bit, the parity of the frame
+/// that the unit arrived in: every unit arrives in every frame, so a cell that is not yet written in
+/// this frame was written in the one before.
 #[derive(Debug)]
-pub struct Arrival(Atomic);
-
-impl Arrival {
-    const_fn! {
-        /// A place that is in no list yet.
-        pub const fn new() -> Self {
-            Self(Atomic::new(NONE))
-        }
-    }
+pub struct Arrivals<'m> {
+    cells: &'m [QueueSlot],
+    /// The first free cell; may lag by one arrival that has not been helped on yet.
+    end: CachePadded<AtomicWord>,
 }
 
-impl Default for Arrival {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-/// The frame's arrival set.
-#[derive(Debug)]
-pub struct Arrivals {
-    newest: CachePadded<Atomic>,
-}
-
-impl Arrivals {
-    const_fn! {
-        /// Nobody has arrived.
-        pub const fn new() -> Self {
-            Self { newest: CachePadded::new(Atomic::new(NONE)) }
-        }
+impl<'m> Arrivals<'m> {
+    /// Nobody has arrived in a frame of even number; a cell for each unit that ever arrives.
+    pub fn new(cells: &'m mut [QueueSlot]) -> Self {
+        cells.iter().for_each(|cell| cell.0.store(1, site::EXCLUSIVE));
+        Self { cells, end: CachePadded::new(AtomicWord::new(0)) }
     }
 
-    /// Arrives as `index`, whose place is `own`, and returns the newest earlier arrival, from
-    /// which [`Arrivals::before`] leads to all others.
+    /// Arrives as `index` and returns those that arrived before in this frame, oldest first.
     ///
-    /// The caller sees all that the earlier arrivers did before they arrived.
+    /// The caller sees all that they did before they arrived.
     #[inline]
-    pub fn arrive(&self, index: u32, own: &Arrival) -> Option<u32> {
-        let mut newest = self.newest.load(site::ARRIVALS_LOOK);
-        loop {
-            own.0.store(newest, site::ARRIVALS_LINK);
-            match self.newest.exchange(newest, index, site::ARRIVALS_PUSH) {
-                Ok(earlier) => return (earlier != NONE).then_some(earlier),
-                Err(found) => newest = found,
+    pub fn arrive(&self, index: u32, frame: Frame) -> impl Iterator<Item = u32> + use<'m> {
+        let word = (index as usize) << 1 | frame.parity();
+        let place = loop {
+            let end = self.end.load(site::ARRIVALS_END_LOAD);
+            // There is a cell for each unit that arrives.
+            let Some(cell) = self.cells.get(end) else { break end };
+            let seen = cell.0.load(site::ARRIVALS_LOOK);
+            // Last frame's cell is free. Publishing is this one CAS.
+            if seen & 1 != frame.parity()
+                && cell.0.exchange(seen, word, site::ARRIVALS_PUBLISH).is_ok()
+            {
+                self.help_end(end);
+                break end;
             }
+            // This frame's already: who wrote it has not moved the end yet.
+            self.help_end(end);
             spin_hint();
-        }
+        };
+        let earlier = self.cells.get(..place).unwrap_or_default();
+        earlier.iter().map(|cell| (cell.0.load(site::ARRIVALS_READ) >> 1) as u32)
     }
 
-    /// Who arrived just before the unit whose place is `place`.
-    #[inline]
-    pub fn before(place: &Arrival) -> Option<u32> {
-        let earlier = place.0.load(site::ARRIVALS_FOLLOW);
-        (earlier != NONE).then_some(earlier)
+    fn help_end(&self, end: usize) {
+        // Failure means that somebody else helped; either way the end has moved on.
+        let _ = self.end.exchange(end, end + 1, site::ARRIVALS_END_HELP);
     }
 
     /// Forgets all. Only when every arriver of the frame has read its list to the end, and
     /// before any arrives in the next.
     #[inline]
     pub fn clear(&self) {
-        self.newest.store(NONE, site::ARRIVALS_RESET);
-    }
-}
-
-impl Default for Arrivals {
-    fn default() -> Self {
-        Self::new()
+        self.end.store(0, site::ARRIVALS_RESET);
     }
 }

@@ -5,6 +5,7 @@ use crate::environment::Environment;
 use crate::frame::Frame;
 use crate::inbox::{From, Mail, Rejected};
 use crate::storage::Chain;
+use crate::sync::site;
 use crate::tables::Tables;
 use crate::unit::{InteractionId, NONE, UnitId};
 
@@ -13,8 +14,6 @@ pub struct Inputs<'t, 'm, E: Environment + ?Sized> {
     tables: &'t Tables<'m, E>,
     unit: UnitId,
     frame: Frame,
-    /// First of the unit's candidates, sorted by pair.
-    candidates: u32,
     mail: Mail<'t, 'm, E::Message>,
     /// Letters posted so far by this update.
     posted: u32,
@@ -35,9 +34,8 @@ pub struct Interacted<'t, 'm, I, C> {
 
 impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
     pub(crate) fn new(tables: &'t Tables<'m, E>, unit: UnitId, frame: Frame) -> Self {
-        let candidates = tables.sort_candidates(unit);
         let mail = tables.post.collect(&tables.unit(unit).inbox, frame);
-        Self { tables, unit, frame, candidates, mail, posted: 0 }
+        Self { tables, unit, frame, mail, posted: 0 }
     }
 
     /// The unit's interactions of this frame that passed the broad phase, in pair order: by the
@@ -45,8 +43,17 @@ impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
     pub fn interactions(
         &self,
     ) -> impl Iterator<Item = Interacted<'t, 'm, E::Interaction, E::Contact>> + use<'t, 'm, E> {
+        self.tables.sort_candidates(self.unit);
+        self.interactions_in_any_order()
+    }
+
+    /// The same without the price of sorting, for a host that brings what it reads into an order of
+    /// its own, or does not depend on one.
+    pub fn interactions_in_any_order(
+        &self,
+    ) -> impl Iterator<Item = Interacted<'t, 'm, E::Interaction, E::Contact>> + use<'t, 'm, E> {
         let (tables, unit) = (self.tables, self.unit);
-        let mut next = self.candidates;
+        let mut next = tables.unit(unit).candidates.load(site::CANDIDATE_HEAD);
         ::core::iter::from_fn(move || {
             if next == NONE {
                 return None;
@@ -54,7 +61,7 @@ impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
             let id = InteractionId(next);
             let slot = tables.interaction(id);
             next = slot.next(Chain::Candidates, unit);
-            let first = slot.contacts.load(crate::sync::site::SLOT_FIELD);
+            let first = slot.contacts.load(site::SLOT_FIELD);
             Some(Interacted {
                 id,
                 other: slot.other(unit),

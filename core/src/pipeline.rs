@@ -1,7 +1,6 @@
 //! The four stages wired (Fig. 6): tables, window, queues and bells under one roof, and what a
 //! host may do with them. What a work unit does is in `protocol.rs`.
 
-use crate::arrivals::Arrivals;
 use crate::environment::Environment;
 use crate::error::{SetupError, StillRunning, Table, TableFull};
 use crate::frame::{Entry, Frame, Window};
@@ -9,12 +8,14 @@ use crate::inbox::{From, Rejected};
 use crate::probe::NoProbe;
 use crate::stage::{Stage, Stages};
 use crate::storage::Memory;
-use crate::sync::{Atomic, site};
-use crate::tables::Tables;
+use crate::sync::site;
+use crate::tables::{Home, Tables};
 use crate::token::{Token, TokenOffice};
 use crate::unit::{InteractionId, UnitId, Work};
 use crate::wait::{Bells, Spin, Waiting};
 use crate::worker::Worker;
+
+pub use crate::tables::MOST_HOMES;
 
 /// Which pairs the broad phase tests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -37,11 +38,17 @@ pub struct Config {
     pub entry: Entry,
     /// How many workers may render at once; with 0 no frame is ever swapped.
     pub tokens: u32,
+    /// How many homes the units are shared out to: 1 to [`MOST_HOMES`], the nearest is taken;
+    /// usually one for each worker. A worker does the units of its own home first, in the order of their
+    /// numbers where a frame opens, and then comes to help in others. So what its core has in its cache
+    /// stays there, units that are close in space meet in one cache if the host gives them one home, and
+    /// none of the last is long if the host gives long ones low numbers.
+    pub homes: u32,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { broad_phase: BroadPhase::default(), entry: Entry::default(), tokens: 1 }
+        Self { broad_phase: BroadPhase::default(), entry: Entry::default(), tokens: 1, homes: 1 }
     }
 }
 
@@ -51,11 +58,8 @@ pub struct Pipeline<'m, E: Environment, W: Waiting = Spin> {
     pub(crate) window: Window,
     pub(crate) bells: Bells,
     pub(crate) waiting: W,
-    pub(crate) arrivals: Arrivals,
     pub(crate) office: TokenOffice,
     pub(crate) config: Config,
-    /// Workers that ever joined.
-    pub(crate) joined: Atomic,
 }
 
 impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
@@ -64,15 +68,14 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     /// # Errors
     /// [`SetupError`] names the table that does not fit, or the interaction that joins nothing.
     pub fn new(memory: Memory<'m, E>, config: Config, waiting: W) -> Result<Self, SetupError> {
-        let tables = Tables::new(memory, config.broad_phase == BroadPhase::Pairwise)?;
+        let homes = (config.homes as usize).clamp(1, MOST_HOMES);
+        let tables = Tables::new(memory, config.broad_phase == BroadPhase::Pairwise, homes)?;
         Ok(Self {
             window: Window::new(tables.units.len() as u32),
             bells: Bells::new(),
             waiting,
-            arrivals: Arrivals::new(),
             office: TokenOffice::new(config.tokens),
             config,
-            joined: Atomic::new(0),
             tables,
         })
     }
@@ -88,14 +91,19 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         if frames > 0 {
             self.window.limit = Frame(self.window.limit.0.wrapping_add(frames));
             let units = 0..self.tables.units.len() as u32;
-            units.for_each(|unit| self.tables.queues.enter.push(unit));
+            units.for_each(|unit| self.push(Work::Enter(UnitId(unit))));
         }
         Ok(())
     }
 
-    /// A worker. Any number may join and leave at any time.
+    /// A worker of home 0. Any number may join and leave at any time.
     pub fn worker(&self) -> Worker<'_, 'm, E, W, NoProbe> {
-        Worker::new(self, NoProbe)
+        self.worker_at(0)
+    }
+
+    /// A worker of home `home`, counted round: with two homes, 2 is home 0.
+    pub fn worker_at(&self, home: u32) -> Worker<'_, 'm, E, W, NoProbe> {
+        Worker::new(self, home % self.tables.queues.homes.count(), NoProbe)
     }
 
     /// A render token for `renderer`.
@@ -139,6 +147,12 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         self.tables.post.post(&self.tables.unit(to).inbox, stamp, from, message)
     }
 
+    /// Gives every unit another home, counted round: to balance them, say. At first they are shared out
+    /// in the order of their numbers, as many to each home.
+    pub fn set_homes(&mut self, home_of: impl Fn(UnitId) -> u32) {
+        self.tables.set_homes(home_of);
+    }
+
     /// Takes every letter that waits in an inbox, in order for each unit: to post them anew where
     /// the objects have moved to other units, say.
     pub fn take_letters(&mut self, mut take: impl FnMut(UnitId, From, E::Message)) {
@@ -167,15 +181,20 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         (candidates[0].max(candidates[1]) as usize, contacts[0].max(contacts[1]) as usize)
     }
 
-    /// Stages in which work is queued; `Render` only for a holder.
+    /// Stages in which work is queued at a home or for everybody; `Render` only for a holder.
     #[inline]
-    pub(crate) fn visible(&self, holder: bool) -> Stages {
-        let queues = &self.tables.queues;
+    pub(crate) fn visible(&self, home: &Home<'_>, holder: bool) -> Stages {
         Stages::NONE
-            .with_if(Stage::BroadPhase, !queues.enter.looks_empty())
-            .with_if(Stage::Interaction, !queues.interact.looks_empty())
-            .with_if(Stage::Update, !queues.update.looks_empty())
+            .with_if(Stage::BroadPhase, !home.enter.looks_empty())
+            .with_if(Stage::Interaction, !self.tables.queues.interact.looks_empty())
+            .with_if(Stage::Update, !home.update.looks_empty())
             .with_if(Stage::Render, holder && self.render_visible())
+    }
+
+    /// Stages in which work is queued anywhere; `Render` only for a holder.
+    pub(crate) fn visible_anywhere(&self, holder: bool) -> Stages {
+        let homes = self.tables.queues.homes.from(0);
+        homes.fold(Stages::NONE, |seen, home| seen.union(self.visible(home, holder)))
     }
 
     #[inline]
@@ -184,21 +203,21 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         !self.tables.queues.render[display.parity()].looks_empty()
     }
 
-    /// A queued work unit of `stage`.
+    /// A work unit of `stage` that is queued at a home or for everybody.
     #[inline]
-    pub(crate) fn pop(&self, stage: Stage) -> Option<Work> {
-        let queues = &self.tables.queues;
+    pub(crate) fn pop(&self, home: &Home<'_>, stage: Stage) -> Option<Work> {
+        let interact = &self.tables.queues.interact;
         match stage {
-            Stage::BroadPhase => queues.enter.pop().map(|unit| Work::Enter(UnitId(unit))),
-            Stage::Interaction => queues.interact.pop().map(|id| Work::Interact(InteractionId(id))),
-            Stage::Update => queues.update.pop().map(|unit| Work::Update(UnitId(unit))),
+            Stage::BroadPhase => home.enter.pop().map(|unit| Work::Enter(UnitId(unit))),
+            Stage::Interaction => interact.pop().map(|id| Work::Interact(InteractionId(id))),
+            Stage::Update => home.update.pop().map(|unit| Work::Update(UnitId(unit))),
             Stage::Render => self.pop_render(),
         }
     }
 
     /// A unit of the frame on display. Another holder may have swapped since `display` was read,
     /// and the queue may then hold units of a frame that may not be rendered yet: those go back.
-    fn pop_render(&self) -> Option<Work> {
+    pub(crate) fn pop_render(&self) -> Option<Work> {
         let display = self.window.display();
         let queue = &self.tables.queues.render[display.parity()];
         let unit = UnitId(queue.pop()?);
@@ -214,11 +233,15 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     pub(crate) fn push(&self, work: Work) {
         let queues = &self.tables.queues;
         match work {
-            Work::Enter(unit) => queues.enter.push(unit.0),
+            Work::Enter(unit) => self.home_of(unit).enter.push(unit.0),
             Work::Interact(id) => queues.interact.push(id.0),
-            Work::Update(unit) => queues.update.push(unit.0),
+            Work::Update(unit) => self.home_of(unit).update.push(unit.0),
             Work::Render(unit) => queues.render[self.rendered_frame(unit).parity()].push(unit.0),
         }
+    }
+
+    fn home_of(&self, unit: UnitId) -> &Home<'m> {
+        self.tables.queues.homes.at(self.tables.home_of(unit))
     }
 
     /// The frame of the unit's next update.

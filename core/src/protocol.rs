@@ -3,7 +3,8 @@
 //! One rule throughout: the last arriver at a countdown carries on. `PROTOCOL.md` states who may
 //! write what when, and why.
 
-use crate::arrivals::Arrivals;
+use heapless::Vec;
+
 use crate::contacts::Contacts;
 use crate::environment::{Environment, Pair};
 use crate::error::TableFull;
@@ -16,6 +17,10 @@ use crate::token::Token;
 use crate::unit::{InteractionId, NONE, UnitId, Work};
 use crate::wait::Waiting;
 use crate::worker::Outputs;
+
+/// Pairs that are counted and given room together, so that what workers write in common is written
+/// once for many. Usually 32: more than one block has neighbours.
+type Batch<T> = Vec<T, 32>;
 
 impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
     /// Broad phase: the unit arrives, and is tested against those that arrived before.
@@ -45,37 +50,65 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
     fn meet_earlier(&self, env: &E, unit: UnitId, out: &mut impl Outputs) -> Result<(), TableFull> {
         let slot = self.tables.unit(unit);
         let mut outcome = Ok(());
-        let mut earlier = self.arrivals.arrive(unit.0, &slot.arrival).map(UnitId);
+        let mut found = Batch::new();
+        let mut meet = |other, out: &mut _| {
+            if found.push(other).is_err() {
+                outcome = self.found(unit, &found, out).and(outcome);
+                found.clear();
+                let _fits = found.push(other);
+            }
+        };
         // SAFETY: a unit that has entered the frame is not updated before the gate opens, for
         // which this unit must have left it; until then it is only read.
         unsafe {
             slot.object.with(|object| {
                 if env.interacts_within(object) {
-                    outcome = self.found(unit, unit, out).and(outcome);
+                    meet(unit, out);
                 }
-                while let Some(other) = earlier {
-                    let met = self.tables.unit(other);
-                    if met.object.with(|object_met| env.broad_phase(object, object_met)) {
-                        outcome = self.found(unit, other, out).and(outcome);
+                for other in self.tables.arrivals.arrive(unit.0, self.next_frame(unit)).map(UnitId)
+                {
+                    let met = &self.tables.unit(other).object;
+                    if met.with(|object_met| env.broad_phase(object, object_met)) {
+                        meet(other, out);
                     }
-                    earlier = Arrivals::before(&met.arrival).map(UnitId);
                 }
             });
         }
-        outcome
+        self.found(unit, &found, out).and(outcome)
     }
 
-    /// A pair found at run time.
-    fn found(&self, unit: UnitId, other: UnitId, out: &mut impl Outputs) -> Result<(), TableFull> {
-        let id = self.tables.claim_candidate(self.next_frame(unit))?;
-        self.tables.interaction(id).join([unit.min(other), unit.max(other)]);
-        self.candidate(id, out);
+    /// Pairs of `unit` found at run time.
+    fn found(
+        &self,
+        unit: UnitId,
+        others: &[UnitId],
+        out: &mut impl Outputs,
+    ) -> Result<(), TableFull> {
+        if others.is_empty() {
+            return Ok(());
+        }
+        let frame = self.next_frame(unit);
+        let ids = match self.tables.claim_candidates(others.len() as u32, frame) {
+            Ok(ids) => ids,
+            // Some may fit.
+            Err(_) if others.len() > 1 => {
+                let one_by_one = others.iter().map(|other| self.found(unit, &[*other], out));
+                return one_by_one.fold(Ok(()), |all, one| one.and(all));
+            }
+            Err(full) => return Err(full),
+        };
+        let ids: Batch<InteractionId> = ids.collect();
+        for (&id, &other) in ids.iter().zip(others) {
+            self.tables.interaction(id).join([unit.min(other), unit.max(other)]);
+        }
+        self.candidates(unit, &ids, out);
         Ok(())
     }
 
     /// Arrives at every modelled interaction of `unit` and tests those whose other end is there.
     fn meet_modelled(&self, env: &E, unit: UnitId, out: &mut impl Outputs) {
         let mut next = self.tables.unit(unit).modelled.load(site::LIST_FOLLOW);
+        let mut found = Batch::new();
         while next != NONE {
             let id = InteractionId(next);
             let slot = self.tables.interaction(id);
@@ -88,20 +121,30 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
             // SAFETY: both ends have entered the frame and this one has not left the gate, so
             // neither is updated; see `meet_earlier`.
             let near = unsafe { a.object.with(|a| b.object.with(|b| env.broad_phase(a, b))) };
-            if near {
-                self.candidate(id, out);
+            if near && found.push(id).is_err() {
+                self.candidates(unit, &found, out);
+                found.clear();
+                let _fits = found.push(id);
             }
         }
+        self.candidates(unit, &found, out);
     }
 
-    /// Counts an interaction at both ends before anyone can end it, then lets it go.
-    fn candidate(&self, id: InteractionId, out: &mut impl Outputs) {
-        let [a, b] = self.tables.interaction(id).ends();
-        for end in ends(a, b) {
-            self.tables.push_candidate(id, end);
-            self.tables.unit(end).pending.add(1);
+    /// Counts interactions of `unit` at both ends before anyone can end them, then lets them go.
+    fn candidates(&self, unit: UnitId, ids: &[InteractionId], out: &mut impl Outputs) {
+        if ids.is_empty() {
+            return;
         }
-        out.emit(Work::Interact(id));
+        for &id in ids {
+            let other = self.tables.interaction(id).other(unit);
+            if other != unit {
+                self.tables.push_candidates(&[id], other);
+                self.tables.unit(other).pending.add(1);
+            }
+        }
+        self.tables.push_candidates(ids, unit);
+        self.tables.unit(unit).pending.add(ids.len() as u32);
+        ids.iter().for_each(|&id| out.emit(Work::Interact(id)));
     }
 
     /// `unit` has entered its frame and made its tests. The last one opens the frame: whatever
@@ -112,10 +155,15 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         if !self.window.gate.arrive() {
             return;
         }
-        self.arrivals.clear();
+        self.tables.arrivals.clear();
         self.tables.reset_pools(frame.next());
         self.window.opened(frame);
-        (0..self.tables.units.len() as u32).for_each(|unit| self.ready(UnitId(unit), out));
+        // Queued, not carried: in the order of their numbers, and for whoever comes first.
+        for unit in (0..self.tables.units.len() as u32).map(UnitId) {
+            if self.tables.unit(unit).pending.arrive() {
+                out.queue(Work::Update(unit));
+            }
+        }
     }
 
     /// One thing less that `unit`'s update waits for.

@@ -12,9 +12,9 @@ use crossbeam_utils::CachePadded;
 
 use crate::sync::{AtomicWord, const_fn, site, spin_hint};
 
-/// Memory of one ring slot.
+/// Memory of one slot of a queue, or of the list of arrivals.
 #[derive(Debug)]
-pub struct QueueSlot(AtomicWord);
+pub struct QueueSlot(pub(crate) AtomicWord);
 
 impl QueueSlot {
     const_fn! {

@@ -47,6 +47,13 @@ impl Stages {
         Self(self.0 | u8::from(condition) << stage as u8)
     }
 
+    /// What is in either set.
+    #[inline]
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
     /// This set less `stage`.
     #[inline]
     #[must_use]

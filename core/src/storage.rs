@@ -1,7 +1,6 @@
 //! The memory that a host hands over: plain slices, from arrays in a `static`, from the stack or
 //! from a heap. The core allocates nothing.
 
-use crate::arrivals::Arrival;
 use crate::contacts::{ContactSlot, SegmentSlot};
 use crate::countdown::Countdown;
 use crate::environment::Environment;
@@ -10,18 +9,17 @@ use crate::ring::{QueueSlot, slots_for};
 use crate::sync::{Atomic, Cell, const_fn, site};
 use crate::unit::{NONE, UnitId};
 
-/// Memory of one unit and what the protocol knows of it. Units have cache lines of their own.
+/// Memory of one unit and what the protocol knows of it. Units have cache lines of their own, and what
+/// others write of a unit is side by side in the first.
 #[derive(Debug)]
-#[repr(align(128))]
+#[repr(C, align(128))]
 pub struct UnitSlot<O> {
-    pub(crate) object: Cell<O>,
     /// What has to happen before the unit's next update: its interactions, the opening of the
     /// frame, and its rendering in the frame before.
     pub(crate) pending: Countdown,
     /// The frame of the unit's next update.
     pub(crate) frame: Atomic,
-    pub(crate) arrival: Arrival,
-    /// The worker that updated it last, in whose core's cache it is.
+    /// Whose it is, in the pipeline at hand: see [`Config::homes`](crate::pipeline::Config::homes).
     pub(crate) home: Atomic,
     /// First of this frame's candidates.
     pub(crate) candidates: Atomic,
@@ -32,6 +30,7 @@ pub struct UnitSlot<O> {
     pub(crate) solitary: bool,
     /// Whether it bypasses the first two stages, in the pipeline at hand.
     pub(crate) bypasses: bool,
+    pub(crate) object: Cell<O>,
 }
 
 impl<O> UnitSlot<O> {
@@ -39,16 +38,15 @@ impl<O> UnitSlot<O> {
         /// A unit that may interact.
         pub const fn new(object: O) -> Self {
             Self {
-                object: Cell::new(object),
                 pending: Countdown::new(0),
                 frame: Atomic::new(0),
-                arrival: Arrival::new(),
-                home: Atomic::new(NONE),
+                home: Atomic::new(0),
                 candidates: Atomic::new(NONE),
                 modelled: Atomic::new(NONE),
                 inbox: Inbox::new(),
                 solitary: false,
                 bypasses: false,
+                object: Cell::new(object),
             }
         }
     }
@@ -167,13 +165,14 @@ pub struct Memory<'m, E: Environment> {
     pub segments: &'m mut [SegmentSlot],
     /// As many as letters may be under way at once.
     pub letters: &'m mut [LetterSlot<E::Message>],
-    /// [`queue_slots`] of the numbers above.
+    /// [`queue_slots`] of the numbers above and of homes.
     pub queues: &'m mut [QueueSlot],
 }
 
 /// How many queue slots a pipeline of these sizes needs.
-pub const fn queue_slots(units: usize, interactions: usize, letters: usize) -> usize {
-    4 * slots_for(units) + slots_for(interactions) + slots_for(letters)
+pub const fn queue_slots(units: usize, interactions: usize, letters: usize, homes: usize) -> usize {
+    let rings = 2 * (homes + 1) * slots_for(units) + slots_for(interactions) + slots_for(letters);
+    rings + units
 }
 
 /// Hands a `static` out exactly once, for hosts without a heap.

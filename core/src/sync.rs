@@ -126,15 +126,17 @@ sites! {
     COUNTDOWN_ADD = Relaxed;
     /// Relaxed: nobody arrives before the re-armed counter was published by something else.
     COUNTDOWN_ARM = Relaxed;
-    /// Acquire and Release: an arriver reads the objects of those before it, and is read by
-    /// those after it.
-    ARRIVALS_PUSH = AcqRel;
+    /// Acquire: pairs with `ARRIVALS_END_HELP`. Whoever sees this end also sees the cells before it
+    /// written in this frame.
+    ARRIVALS_END_LOAD = Acquire;
     /// Relaxed: re-validated by the CAS that follows.
     ARRIVALS_LOOK = Relaxed;
-    /// Relaxed: written before `ARRIVALS_PUSH` publishes it.
-    ARRIVALS_LINK = Relaxed;
-    /// Relaxed: read after `ARRIVALS_PUSH` acquired it.
-    ARRIVALS_FOLLOW = Relaxed;
+    /// Release: an arriver's object is read by those after it.
+    ARRIVALS_PUBLISH = Release;
+    /// Release: the cell below the new end was written, or seen written, before.
+    ARRIVALS_END_HELP = Release;
+    /// Acquire: pairs with `ARRIVALS_PUBLISH`.
+    ARRIVALS_READ = Acquire;
     /// Relaxed: nobody arrives before the frame's gate was opened, which publishes this.
     ARRIVALS_RESET = Relaxed;
     /// Relaxed: lists of candidates and letters are walked only by the unit's updater, after
@@ -166,7 +168,7 @@ sites! {
     DISPLAY_ADVANCE = Release;
     /// Acquire: pairs with `DISPLAY_ADVANCE`.
     DISPLAY_LOAD = Acquire;
-    /// Relaxed: a hint, by which updates find back to the core that did the last one.
+    /// Relaxed: changed by exclusive access only, between two runs.
     HOME = Relaxed;
     /// Relaxed: a hint. Who misses it carries on with what it has, and looks again at its next step.
     HUNGRY = Relaxed;

@@ -10,7 +10,7 @@ use crate::probe::{NoProbe, Probe};
 use crate::stage::{Stage, Stages};
 use crate::sync::{fence, site};
 use crate::token::Token;
-use crate::unit::{NONE, UnitId, Work};
+use crate::unit::{UnitId, Work};
 use crate::wait::{Spin, Waiting};
 
 /// What a step did.
@@ -51,8 +51,7 @@ struct Carry<'p, 'm, E: Environment, W: Waiting> {
     renders: u32,
     /// Whether this worker is counted among the hungry.
     hungry: bool,
-    /// This worker's, among all that ever joined.
-    number: u32,
+    home: u32,
 }
 
 impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
@@ -72,12 +71,10 @@ impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
         }
     }
 
-    /// Whether another worker updated `unit` last: its core has the unit in its cache, and is to have
-    /// it again if it comes for it in time.
+    /// Whether `unit` is another home's, whose worker is to have it if it comes for it in time.
     #[inline]
     fn is_at_home_elsewhere(&self, unit: UnitId) -> bool {
-        let home = self.pipeline.tables.unit(unit).home.load(site::HOME);
-        home != self.number && home != NONE
+        self.pipeline.tables.home_of(unit) != self.home
     }
 
     /// Counts this worker among the hungry, or not.
@@ -96,7 +93,7 @@ impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
         self.shed();
         // Whoever still counts this worker among the sleepers has queued its work before this.
         fence(site::FENCE_LEAVE);
-        let left = self.pipeline.visible(true);
+        let left = self.pipeline.visible_anywhere(true);
         self.renders += u32::from(left.contains(Stage::Render));
         self.queued += u32::from(left.without(Stage::Render) != Stages::NONE);
         self.announce();
@@ -159,16 +156,15 @@ pub struct Worker<'p, 'm, E: Environment, W: Waiting = Spin, P: Probe = NoProbe>
 }
 
 impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
-    pub(crate) fn new(pipeline: &'p Pipeline<'m, E, W>, probe: P) -> Self {
-        let number = pipeline.joined.fetch_add(1, site::HOME);
+    pub(crate) fn new(pipeline: &'p Pipeline<'m, E, W>, home: u32, probe: P) -> Self {
         let carry =
-            Carry { pipeline, works: Vec::new(), queued: 0, renders: 0, hungry: false, number };
+            Carry { pipeline, works: Vec::new(), queued: 0, renders: 0, hungry: false, home };
         Self { carry, stage: Stage::BroadPhase, token: None, probe }
     }
 
     /// A worker like this one, new, watched by `probe`.
     pub fn probed<Q: Probe>(self, probe: Q) -> Worker<'p, 'm, E, W, Q> {
-        Worker::new(self.carry.pipeline, probe)
+        Worker::new(self.carry.pipeline, self.carry.home, probe)
     }
 
     /// Gives this worker the right to render, and its renderer.
@@ -223,7 +219,6 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
                 .map_err(<E::Error as From<TableFull>>::from),
             (Work::Interact(id), _) => pipeline.interact(env, id, &mut self.carry),
             (Work::Update(unit), token) => {
-                pipeline.tables.unit(unit).home.store(self.carry.number, site::HOME);
                 pipeline.update(env, unit, token.is_some(), &mut self.carry)
             }
             (Work::Render(unit), Some(token)) => pipeline.render(env, unit, token, &mut self.carry),
@@ -245,7 +240,7 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         if holder
             && !matches!(self.carry.works.last(), Some(Work::Render(_)))
             && pipeline.render_visible()
-            && let Some(work) = pipeline.pop(Stage::Render)
+            && let Some(work) = pipeline.pop_render()
         {
             return Some(work);
         }
@@ -254,10 +249,14 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         }
         // Visible work may be gone when it is popped: look again, but no stage more than once,
         // so that a step is bounded.
-        for _ in Stage::ALL {
-            let stage = migrate(self.stage, pipeline.visible(holder))?;
-            if let Some(work) = pipeline.pop(stage) {
-                return Some(work);
+        for home in pipeline.tables.queues.homes.from(self.carry.home) {
+            for _ in Stage::ALL {
+                let Some(stage) = migrate(self.stage, pipeline.visible(home, holder)) else {
+                    break;
+                };
+                if let Some(work) = pipeline.pop(home, stage) {
+                    return Some(work);
+                }
             }
         }
         None
@@ -267,7 +266,7 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
     pub fn has_cause_to_wake(&self) -> bool {
         let pipeline = self.carry.pipeline;
         !self.carry.works.is_empty()
-            || !pipeline.visible(self.token.is_some()).is_empty()
+            || !pipeline.visible_anywhere(self.token.is_some()).is_empty()
             || pipeline.finished()
     }
 

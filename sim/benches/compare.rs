@@ -10,7 +10,11 @@ use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::load::{RenderLoad, StandIn};
 use dualframe_sim::experiment::race::{Race, Runner, WARM_UP};
 use dualframe_sim::experiment::speedup::efficiency;
+use dualframe_sim::experiment::statistics::Quartiles;
 use dualframe_sim::scene::ParticleScene;
+
+/// Measurements of what threads without anything in common gain.
+const GAIN_ROUNDS: usize = 5;
 
 fn main() -> ExitCode {
     common::main(compare)
@@ -40,8 +44,11 @@ fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
             // The lowest of the medians: a minimum within each round would favour whichever
             // executor happened to be undisturbed.
             let fastest = others.iter().map(|&other| over(other)).fold(f64::INFINITY, f64::min);
+            let gains: Result<Vec<f64>, _> =
+                (0..GAIN_ROUNDS).map(|_| race.independent_gain(arguments.threads)).collect();
+            let ceiling = Quartiles::of(gains?).map_or(f64::NAN, |gains| gains.median);
             let mut line = format!(
-                "{objects:7}  {:8}  {s_s:5.3}  {:5.3}  {fastest:7.3}",
+                "{objects:7}  {:8}  {ceiling:7.3}  {s_s:5.3}  {:5.3}  {fastest:7.3}",
                 load.name(),
                 efficiency(s_p, arguments.threads)
             );
@@ -54,7 +61,7 @@ fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
     let names: String =
         others.iter().map(|other| format!("  {:>16}", other.executor.name())).collect();
     println!("\n{}: medians over good rounds (all if none is good)", pipeline.label());
-    println!("objects  render      S_s    E_p  fastest{names}");
+    println!("objects  render    ceiling    S_s    E_p  fastest{names}");
     lines.iter().for_each(|line| println!("{line}"));
     Ok(())
 }

@@ -4,7 +4,7 @@ use crate::behavior::{Segment, Workspace};
 use crate::geometry::{Bounds, LANES, Lanes};
 use crate::interaction::{Contact, group_set};
 use crate::object::{Object, ObjectId};
-use crate::simd::{LaneSet, first_lanes, lanes};
+use crate::simd::{Isa, Kernel, LaneSet, Simd, first_lanes, lanes};
 
 /// One or more objects that go through the stages together, in ascending order of their numbers.
 #[derive(Default)]
@@ -139,22 +139,38 @@ impl Boxes {
     /// The places, from `first` on, of the boxes that overlap `bounds`, in ascending order.
     pub(crate) fn overlapping(
         &self,
-        bounds: &Bounds,
+        simd: Simd,
+        bounds: Bounds,
         first: usize,
     ) -> impl Iterator<Item = usize> + use<'_> {
-        let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
         (first / LANES..self.min[0].len()).flat_map(move |chunk| {
-            let mut hits = LaneSet::MAX;
-            for axis in 0..3 {
-                let (low, high) = (&self.min[axis][chunk], &self.max[axis][chunk]);
-                for lane in 0..LANES {
-                    let overlap = (low[lane] <= max[axis]) & (high[lane] >= min[axis]);
-                    hits &= !(LaneSet::from(!overlap) << lane);
-                }
-            }
+            let hits = simd.run(Overlaps { boxes: self, chunk, bounds: &bounds });
             let start = chunk * LANES;
             let places = lanes(hits & !first_lanes(first.saturating_sub(start)));
             places.map(move |lane| start + lane)
         })
+    }
+}
+
+/// The test of a chunk of boxes against one.
+struct Overlaps<'a> {
+    boxes: &'a Boxes,
+    chunk: usize,
+    bounds: &'a Bounds,
+}
+
+impl Kernel for Overlaps<'_> {
+    type Output = LaneSet;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> LaneSet {
+        let Self { boxes: Boxes { min, max, .. }, chunk, bounds } = self;
+        let mut hits = LaneSet::MAX;
+        for axis in 0..3 {
+            let (low, high) = (isa.load(&min[axis][chunk]), isa.load(&max[axis][chunk]));
+            hits &= isa.at_most(low, isa.splat(bounds.max[axis]));
+            hits &= isa.at_most(isa.splat(bounds.min[axis]), high);
+        }
+        hits
     }
 }

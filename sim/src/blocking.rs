@@ -1,5 +1,7 @@
 //! How objects are grouped into blocks: by recursive median splits of their positions.
 
+use std::cmp::Reverse;
+
 use thiserror::Error;
 
 use crate::block::Block;
@@ -38,7 +40,7 @@ pub enum BlockingError {
 }
 
 /// The frames between two regroupings: in so many a particle moves by a fraction of a block.
-pub const FRAMES_PER_BLOCKING: u64 = 16;
+pub const FRAMES_PER_BLOCKING: u64 = 32;
 
 /// Objects a block where there are few objects.
 const OBJECTS_PER_BLOCK: usize = 16;
@@ -57,16 +59,36 @@ const BLOCKS_PER_WORKER: usize = 4;
 /// is filled again.
 pub struct Blocking {
     objects: Vec<Option<Object>>,
-    members: Vec<Vec<u32>>,
+    members: Vec<Members>,
     keys: Vec<Key>,
     moving_blocks: usize,
 }
 
-/// Where an object is.
+/// Who is in a block.
+#[derive(Default)]
+struct Members {
+    ids: Vec<u32>,
+    /// What their updates take, in seconds, as far as it is known.
+    cost: f32,
+    home: u32,
+    /// The place among the blocks as they were split: close in space are close in number.
+    place: usize,
+}
+
+impl Members {
+    /// By home; there by the power of two of their cost, the dearest first; there by place, for neighbours
+    /// that come one after the other meet in the cache.
+    fn order(&self) -> (u32, Reverse<i32>, usize) {
+        (self.home, Reverse(self.cost.log2() as i32), self.place)
+    }
+}
+
+/// Where an object is, and what its update takes.
 #[derive(Clone, Copy)]
 struct Key {
     center: [f32; 3],
     id: u32,
+    cost: f32,
 }
 
 impl Blocking {
@@ -118,10 +140,12 @@ impl Blocking {
                 block_count(solitary.len(), workers),
             ),
         };
-        let mut members = vec![Vec::new(); moving_blocks];
+        let mut members = Vec::new();
+        members.resize_with(moving_blocks, Members::default);
         for (ids, blocks) in [(scenery, scenery_blocks), (solitary, solitary_blocks)] {
             let size = ids.len().div_ceil(blocks.max(1)).max(1);
-            members.extend(ids.chunks(size).map(<[u32]>::to_vec));
+            let chunks = ids.chunks(size);
+            members.extend(chunks.map(|ids| Members { ids: ids.to_vec(), ..Members::default() }));
         }
         let mut blocks = Vec::new();
         blocks.resize_with(members.len(), Block::default);
@@ -151,14 +175,40 @@ impl Blocking {
         split(&mut self.keys, &mut self.members[..self.moving_blocks]);
     }
 
+    /// Shares the moving objects' blocks out to so many homes, for a [`split`](Self::split) that is to be
+    /// worked on from there: blocks of one home are close in space, homes take equally long as far as
+    /// that is known, and each has its longest blocks first, so that none of its last is long.
+    pub fn deal(&mut self, homes: u32) {
+        let moving = &mut self.members[..self.moving_blocks];
+        let total: f32 = moving.iter().map(|members| members.cost).sum();
+        let mut before = 0.0;
+        for (index, members) in moving.iter_mut().enumerate() {
+            let middle = if total > 0.0 {
+                (before + 0.5 * members.cost) / total
+            } else {
+                (index as f32 + 0.5) / self.moving_blocks as f32
+            };
+            members.home = ((middle * homes as f32) as u32).min(homes.saturating_sub(1));
+            before += members.cost;
+            members.place = index;
+        }
+        moving.sort_unstable_by_key(Members::order);
+    }
+
+    /// The home of the block number `index`; 0 without such a block, and for those that never move.
+    #[must_use]
+    pub fn home(&self, index: usize) -> u32 {
+        self.members.get(index).map_or(0, |members| members.home)
+    }
+
     /// Puts the objects of the block number `index` into it.
     pub fn fill(&mut self, index: usize, block: &mut Block) {
-        let Some(members) = self.members.get(index) else { return };
-        block.objects.reserve(members.len());
-        for &id in members {
+        let Some(Members { ids, .. }) = self.members.get(index) else { return };
+        block.objects.reserve(ids.len());
+        for &id in ids {
             block.objects.extend(self.objects.get_mut(id as usize).and_then(Option::take));
         }
-        block.gathered.reserve(members.len());
+        block.gathered.reserve(ids.len());
         block.refresh();
     }
 }
@@ -186,18 +236,19 @@ fn block_count(objects: usize, workers: usize) -> usize {
 
 impl Key {
     fn new(object: &Object) -> Self {
-        Self { center: object.center().to_array(), id: object.id().0 }
+        Self { center: object.center().to_array(), id: object.id().0, cost: object.cost() }
     }
 }
 
 /// Shares the objects out evenly: halves along the longest side until each part is one block.
-fn split(keys: &mut [Key], members: &mut [Vec<u32>]) {
+fn split(keys: &mut [Key], members: &mut [Members]) {
     match members {
         [] => {}
         [only] => {
-            only.clear();
-            only.extend(keys.iter().map(|key| key.id));
-            only.sort_unstable();
+            only.ids.clear();
+            only.ids.extend(keys.iter().map(|key| key.id));
+            only.ids.sort_unstable();
+            only.cost = keys.iter().map(|key| key.cost).sum();
         }
         _ => {
             let half = members.len() / 2;
@@ -225,4 +276,64 @@ fn longest_side(keys: &[Key]) -> usize {
     };
     let sides = [side(0), side(1), side(2)];
     (1..3).fold(0, |longest, axis| if sides[axis] > sides[longest] { axis } else { longest })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::scene::ParticleScene;
+
+    /// Deals particles whose updates take so many microseconds; what each home is given, block by block.
+    fn dealt(micros: &[u64], homes: u32) -> Vec<Vec<u64>> {
+        let scene = ParticleScene::new(micros.len()).build().expect("a valid scene");
+        let mut objects = scene.objects;
+        for (object, &micros) in objects.iter_mut().zip(micros) {
+            object.note_cost(Duration::from_micros(micros));
+        }
+        let (mut blocking, mut blocks) =
+            Blocking::new(objects, Grain::Spatial, 2).expect("a valid environment");
+        blocks.iter_mut().for_each(|block| blocking.drain(block));
+        blocking.split();
+        blocking.deal(homes);
+        let mut given = vec![Vec::new(); homes as usize];
+        for (index, block) in blocks.iter_mut().enumerate() {
+            blocking.fill(index, block);
+            let cost = |object: &Object| (object.cost() * 1e6).round() as u64;
+            let moving = block.objects().iter().filter(|object| kind(object) == MOVING);
+            let cost: u64 = moving.map(cost).sum();
+            if cost > 0 {
+                given[blocking.home(index) as usize].push(cost);
+            }
+        }
+        given
+    }
+
+    #[test]
+    fn homes_take_equally_long_and_begin_with_the_longest() {
+        let micros: Vec<u64> = (1..=30).map(|object| object * object % 97 + 1).collect();
+        let longest = 97;
+        for homes in 1..=4 {
+            let given = dealt(&micros, homes);
+            let share = micros.iter().sum::<u64>() / u64::from(homes);
+            for home in &given {
+                let cost: u64 = home.iter().sum();
+                assert!(cost.abs_diff(share) <= longest, "{cost} of {share} µs, {homes} homes");
+                let halves = home.windows(2).filter(|pair| pair[1] >= 2 * pair[0]);
+                assert_eq!(halves.count(), 0, "a long one after a short one: {home:?}");
+            }
+            assert_eq!(given.iter().map(Vec::len).sum::<usize>(), micros.len());
+        }
+    }
+
+    #[test]
+    fn an_interrupted_update_counts_at_most_double() {
+        let scene = ParticleScene::new(1).build().expect("a valid scene");
+        let mut object = scene.objects.into_iter().next().expect("a particle");
+        for (took, expected) in [(4, 4.0), (4_000, 6.0), (2, 4.0)] {
+            object.note_cost(Duration::from_micros(took));
+            assert!((object.cost() * 1e6 - expected).abs() < 1e-3, "{} s", object.cost());
+        }
+    }
 }

@@ -17,6 +17,10 @@ use crate::object::{Drawing, Fault, FaultKind, Object, ObjectId};
 use crate::render::Renderer;
 use crate::simd::Simd;
 
+/// Of so many frames the updates of one are timed, for who balances them; usually 16: reading the
+/// system's clock for every object takes up to a tenth of its update.
+const FRAMES_PER_TIMING: u64 = 16;
+
 /// What the interaction stage counted. Independent of blocking and executor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PairCount {
@@ -57,7 +61,7 @@ impl Stages {
         }
         // Around walls a block's box says little, but there are few of them.
         let (few, many) = if a.objects.len() < b.objects.len() { (a, b) } else { (b, a) };
-        few.boxes.overlapping(&many.bounds(), 0).next().is_some()
+        few.boxes.overlapping(self.simd, many.bounds(), 0).next().is_some()
     }
 
     /// Whether objects within one block may touch each other.
@@ -80,9 +84,9 @@ impl Stages {
     ) -> Result<PairCount, TableFull> {
         let (few, many) = if a.objects.len() < b.objects.len() { (a, b) } else { (b, a) };
         let mut count = PairCount::default();
-        for place in few.boxes.overlapping(&many.bounds(), 0) {
+        for place in few.boxes.overlapping(self.simd, many.bounds(), 0) {
             let one = &few.objects[place];
-            for other in many.boxes.overlapping(&one.bounds(), 0) {
+            for other in many.boxes.overlapping(self.simd, one.bounds(), 0) {
                 count += self.interact_pair(one, &many.objects[other], scratch, sink)?;
             }
         }
@@ -101,7 +105,7 @@ impl Stages {
     ) -> Result<PairCount, TableFull> {
         let mut count = PairCount::default();
         for (place, one) in block.objects.iter().enumerate() {
-            for other in block.boxes.overlapping(&one.interaction_bounds(), place + 1) {
+            for other in block.boxes.overlapping(self.simd, one.interaction_bounds(), place + 1) {
                 count += self.interact_pair(one, &block.objects[other], scratch, sink)?;
             }
         }
@@ -171,7 +175,8 @@ impl Stages {
         post: &mut dyn FnMut(ObjectId, ObjectId, Message),
     ) {
         let frame = given.frame;
-        let began = self.callback_budget.map(|budget| (Instant::now(), budget));
+        let timed = frame.is_multiple_of(FRAMES_PER_TIMING) || self.callback_budget.is_some();
+        let began = timed.then(Instant::now);
         let mut input = Input {
             frame,
             time_step: self.time_step,
@@ -191,9 +196,14 @@ impl Stages {
                 object.behavior.update(&mut object.geometry, &mut input);
             }
         }));
+        let took = began.map(|began| began.elapsed());
+        if let Some(took) = took {
+            object.note_cost(took);
+        }
         if done.is_err() {
             object.quarantine(Fault { kind: FaultKind::Panicked, frame });
-        } else if began.is_some_and(|(began, budget)| began.elapsed() > budget) {
+        } else if self.callback_budget.is_some_and(|budget| took.is_some_and(|took| took > budget))
+        {
             object.quarantine(Fault { kind: FaultKind::OverBudget, frame });
         } else if object.quarantined().is_none() {
             object.refresh(frame);

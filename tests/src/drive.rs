@@ -137,7 +137,7 @@ fn run_pipeline<'c>(case: &'c Case, trace: &'c Trace) -> (Outcome, Vec<String>) 
     let records = 2 * most * MOST_RECORDS;
     // Those due now and those for the next frame, and one from outside.
     let letters = 2 * MOST_LETTERS * units + 1;
-    let queues = queue_slots(units, interactions.len(), letters);
+    let queues = queue_slots(units, interactions.len(), letters, case.homes as usize);
     let mut wrong = vec![];
     let memory = Tables {
         units: &mut unit_slots,
@@ -147,7 +147,8 @@ fn run_pipeline<'c>(case: &'c Case, trace: &'c Trace) -> (Outcome, Vec<String>) 
         letters: &mut Vec::from_iter((0..letters).map(|_| LetterSlot::new())),
         queues: &mut Vec::from_iter((0..queues).map(|_| QueueSlot::new())),
     };
-    let config = Config { broad_phase: case.broad_phase, entry: case.entry, tokens: case.tokens };
+    let Case { broad_phase, entry, tokens, homes, .. } = *case;
+    let config = Config { broad_phase, entry, tokens, homes };
     let mut pipeline: Machine<'_, 'c> =
         Pipeline::new(memory, config, Park::default()).expect("memory that fits");
     let mut failures = vec![];
@@ -239,7 +240,7 @@ impl<'p, 'c> Shop<'p, 'c> {
         // The first thread never leaves, so that there is one.
         let may_leave = thread != 0 && dice.one_in(2);
         let leaves = if may_leave { dice.below(120) } else { u32::MAX };
-        let mut worker = pipeline.worker();
+        let mut worker = pipeline.worker_at(thread);
         let mut stepped = 0;
         while !self.over(pipeline) && (stepped < leaves || !self.may_go(&mut worker)) {
             stepped = stepped.saturating_add(1);
@@ -260,7 +261,7 @@ impl<'p, 'c> Shop<'p, 'c> {
                 if dice.one_in(4) {
                     std::thread::yield_now();
                 }
-                worker = pipeline.worker();
+                worker = pipeline.worker_at(thread);
                 if let Some(token) = holding {
                     let token = pipeline.token(Screen { token }).map_err(drop).expect("a token");
                     self.tokens.lock().expect("no poison").push(token);

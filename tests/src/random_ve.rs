@@ -26,6 +26,8 @@ pub struct Case {
     pub workers: u32,
     /// Render tokens.
     pub tokens: u32,
+    /// Homes that the units are shared out to.
+    pub homes: u32,
     /// Whether callbacks fail now and then.
     pub faults: bool,
     /// Whether idle workers sleep until they are woken, instead of looking again and again.
@@ -91,9 +93,9 @@ pub fn cases(broad_phase: BroadPhase, sleep: bool) -> impl Strategy<Value = Case
     let bodies = prop::collection::vec(body(), 1..8);
     let edges = prop::collection::vec((0..64_u32, 0..64_u32), 0..12);
     let segments = prop::collection::vec(1..6_u32, 1..4);
-    let running = (segments, entry, 1..=8_u32, 1..=2_u32, prop::bool::ANY);
+    let running = (segments, entry, 1..=8_u32, 1..=2_u32, 1..=3_u32, prop::bool::ANY);
     (any::<u64>(), bodies, edges, running).prop_map(
-        move |(seed, mut units, edges, (segments, entry, workers, tokens, faults))| {
+        move |(seed, mut units, edges, (segments, entry, workers, tokens, homes, faults))| {
             let count = units.len() as u32;
             for (unit, (_, body)) in units.iter_mut().enumerate() {
                 body.unit = unit as u32;
@@ -110,6 +112,7 @@ pub fn cases(broad_phase: BroadPhase, sleep: bool) -> impl Strategy<Value = Case
                 entry,
                 workers,
                 tokens,
+                homes,
                 faults,
                 sleep,
             }

@@ -132,7 +132,7 @@ impl Sizes {
 
     /// Builds a pipeline of these sizes and hands it on.
     fn with<R>(&self, then: impl FnOnce(Result<Pipeline<'_, Flood>, SetupError>) -> R) -> R {
-        let needed = queue_slots(self.units, self.interactions.len(), self.letters);
+        let needed = queue_slots(self.units, self.interactions.len(), self.letters, 1);
         let queues = self.queues.unwrap_or(needed);
         let slot = |&[a, b]: &[u32; 2]| InteractionSlot::between(UnitId(a), UnitId(b), ());
         let memory = Memory {
@@ -276,7 +276,7 @@ fn letters_from_outside_beyond_the_pool() {
 fn memory_that_does_not_fit() {
     let good = Sizes::spatial(5, 20, 10, 3);
     assert_eq!(good.refused(), None);
-    let needed = queue_slots(5, 20, 3);
+    let needed = queue_slots(5, 20, 3, 1);
     for queues in [0, needed - 1] {
         let few = Sizes { queues: Some(queues), ..good.clone() };
         assert_eq!(few.refused(), Some(SetupError::Table(full(Table::Queues, queues, needed))));

@@ -120,7 +120,7 @@ fn pairwise_then_spatial_then_pairwise() {
         contacts: [],
         segments: [],
         letters: [LetterSlot::new()],
-        queues: (0..queue_slots(UNITS, INTERACTIONS, 1)).map(|_| QueueSlot::new()).collect(),
+        queues: (0..queue_slots(UNITS, INTERACTIONS, 1, 1)).map(|_| QueueSlot::new()).collect(),
     };
     assert_eq!(owned.run(BroadPhase::Pairwise, 1, 5), 2 * 5);
     assert_eq!(owned.run(BroadPhase::Spatial, 0, 5), 2 * 5 * 3, "all three meet");

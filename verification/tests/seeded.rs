@@ -117,7 +117,7 @@ impl Meets for Forgetful {
         let before = lend_slice(units, |_| AtomicU32::new(u32::MAX));
         Self { newest: AtomicU32::new(u32::MAX), before }
     }
-    fn arrive(&self, unit: u32) -> Vec<u32> {
+    fn arrive(&self, unit: u32, _: u32) -> Vec<u32> {
         let newest = self.newest.load(Ordering::Acquire);
         self.before[unit as usize].store(newest, Ordering::Release);
         self.newest.store(unit, Ordering::Release);

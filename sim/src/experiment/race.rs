@@ -2,6 +2,8 @@
 
 use std::cell::{Cell, RefCell};
 use std::fmt;
+use std::panic::resume_unwind;
+use std::thread;
 use std::time::{Duration, Instant};
 
 use super::calibrator::Phase;
@@ -132,6 +134,25 @@ impl Race {
     /// The environment cannot be built or run, or an object was quarantined.
     pub fn seconds(&self, runner: Runner) -> Result<f64, ExperimentError> {
         self.once(runner, &Cell::new(None), &mut |_, _| ())
+    }
+
+    /// How much more so many threads get done than one if each runs the serial executor on an
+    /// environment of its own, without anything in common: what this machine would give an executor that
+    /// costs nothing.
+    ///
+    /// # Errors
+    /// As [`Race::seconds`].
+    pub fn independent_gain(&self, threads: usize) -> Result<f64, ExperimentError> {
+        let alone = self.seconds(Runner::SERIAL)?;
+        let together = thread::scope(|scope| {
+            let run = || scope.spawn(|| self.seconds(Runner::SERIAL));
+            let runs: Vec<_> = (0..threads).map(|_| run()).collect();
+            let join = |run: thread::ScopedJoinHandle<'_, _>| {
+                run.join().unwrap_or_else(|panic| resume_unwind(panic))
+            };
+            runs.into_iter().map(join).sum::<Result<f64, ExperimentError>>()
+        })?;
+        Ok(threads as f64 * threads as f64 * alone / together)
     }
 
     /// Seconds of one run, which must end in the expected state, if one is known.

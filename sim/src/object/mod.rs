@@ -5,6 +5,7 @@ mod fault;
 mod visual;
 
 use std::fmt;
+use std::time::Duration;
 
 use glam::Vec3;
 
@@ -48,6 +49,8 @@ pub struct Object {
     quarantined: Option<Fault>,
     bounds: Bounds,
     center: Vec3,
+    /// What an update takes, in seconds, by the last ones that were timed; 0 before the first.
+    cost: f32,
     /// What it looks like.
     pub visual: VisualProperties,
     /// How it is drawn.
@@ -75,6 +78,7 @@ impl Object {
             quarantined: None,
             bounds: geometry.bounds(),
             center: geometry.center(),
+            cost: 0.0,
             visual: VisualProperties::default(),
             drawing: Drawing::default(),
             geometry,
@@ -131,6 +135,19 @@ impl Object {
         self.center
     }
 
+    /// What an update takes, in seconds, by the last ones that were timed; 0 before the first.
+    pub(crate) fn cost(&self) -> f32 {
+        self.cost
+    }
+
+    /// Notes what an update took.
+    pub(crate) fn note_cost(&mut self, took: Duration) {
+        let took = took.as_secs_f32();
+        // An update that was interrupted is not to count for many times what it is.
+        self.cost =
+            if self.cost > 0.0 { 0.5 * (self.cost + took.min(2.0 * self.cost)) } else { took };
+    }
+
     /// The box that interactions are to look at: empty for an object that has none.
     pub(crate) fn interaction_bounds(&self) -> Bounds {
         if self.solitary { Bounds::EMPTY } else { self.bounds }
@@ -185,6 +202,7 @@ impl Object {
             quarantined: self.quarantined,
             bounds: self.bounds,
             center: self.center,
+            cost: self.cost,
             visual: self.visual,
             drawing: self.drawing,
             geometry: self.geometry.clone(),

@@ -1,8 +1,10 @@
 //! The arrival set: each pair meets exactly once, at its second arriver, who may read the first.
 
 use super::{Guarded, Model, Role, check, lend, lend_slice, together};
-use dualframe_core_model::arrivals::{Arrival, Arrivals};
+use dualframe_core_model::arrivals::Arrivals;
 use dualframe_core_model::countdown::Countdown;
+use dualframe_core_model::frame::Frame;
+use dualframe_core_model::ring::QueueSlot;
 use loom::sync::atomic::{AtomicU32, Ordering};
 
 pub(crate) const ALL: &[Model] = &[
@@ -14,22 +16,21 @@ pub(crate) const ALL: &[Model] = &[
 pub(crate) trait Meets: 'static {
     /// Nobody has arrived of `units`.
     fn make(units: usize) -> Self;
-    /// Arrives and lists the earlier arrivals, newest first.
-    fn arrive(&self, unit: u32) -> Vec<u32>;
+    /// Arrives in a frame and lists the earlier arrivals.
+    fn arrive(&self, unit: u32, frame: u32) -> Vec<u32>;
     /// Forgets all.
     fn clear(&self);
 }
 
 /// The core's.
-pub(crate) struct Real(Arrivals, &'static [Arrival]);
+pub(crate) struct Real(Arrivals<'static>);
 
 impl Meets for Real {
     fn make(units: usize) -> Self {
-        Self(Arrivals::new(), lend_slice(units, |_| Arrival::new()))
+        Self(Arrivals::new(lend_slice(units, |_| QueueSlot::new())))
     }
-    fn arrive(&self, unit: u32) -> Vec<u32> {
-        let first = self.0.arrive(unit, &self.1[unit as usize]);
-        std::iter::successors(first, |&at| Arrivals::before(&self.1[at as usize])).collect()
+    fn arrive(&self, unit: u32, frame: u32) -> Vec<u32> {
+        self.0.arrive(unit, Frame(frame)).collect()
     }
     fn clear(&self) {
         self.0.clear();
@@ -46,7 +47,7 @@ pub(crate) fn pairs_meet_once<M: Meets>() {
             Box::new(move || {
                 // The update of the frame before.
                 objects[unit as usize].set(10 + unit);
-                let met = set.arrive(unit);
+                let met = set.arrive(unit, 0);
                 met.iter().for_each(|&met| assert_eq!(objects[met as usize].get(), 10 + met));
                 met
             })
@@ -63,7 +64,7 @@ pub(crate) fn pairs_meet_once<M: Meets>() {
     });
 }
 
-/// Two units, two frames: the gate's last arriver clears the set, and the same links serve again.
+/// Two units, two frames: the gate's last arriver clears the set, and the same cells serve again.
 pub(crate) fn next_frame<M: Meets>() {
     check("arrivals::next_frame", Some(3), 2, [[0, 0], [0, 1], [1, 0], [1, 1]], |order| {
         let set = &*lend(M::make(2));
@@ -72,16 +73,16 @@ pub(crate) fn next_frame<M: Meets>() {
         let objects: &[Guarded<u32>] = lend_slice(2, |_| Guarded::new(0));
         let role = |unit: u32| -> Role<[usize; 2]> {
             Box::new(move || {
-                [1, 2].map(|frame| {
+                [0, 1].map(|frame| {
                     objects[unit as usize].set(frame);
-                    let met = set.arrive(unit);
+                    let met = set.arrive(unit, frame);
                     met.iter().for_each(|&met| assert_eq!(objects[met as usize].get(), frame));
                     if gate.arrive() {
                         set.clear();
                         gate.arm(2);
-                        open.store(frame, Ordering::Release);
+                        open.store(frame + 1, Ordering::Release);
                     }
-                    while open.load(Ordering::Acquire) < frame {
+                    while open.load(Ordering::Acquire) <= frame {
                         loom::hint::spin_loop();
                     }
                     met.len()

@@ -76,7 +76,7 @@ fn two_workers(
                 assert!(worker.hold(token).is_ok());
             }
         };
-        let mut workers = [pipeline.worker(), pipeline.worker()];
+        let mut workers = [pipeline.worker_at(0), pipeline.worker_at(1)];
         hold(&mut workers[0]);
         if setup.tokens > 1 {
             hold(&mut workers[1]);

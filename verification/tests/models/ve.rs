@@ -238,7 +238,7 @@ pub(crate) fn build_with<W: Waiting + 'static>(
     // Exactly what two frames need.
     let contacts = 4 * pairs.len();
     let letters = if setup.letters { 2 } else { 0 };
-    let queues = queue_slots(units, interactions.len(), letters);
+    let queues = queue_slots(units, interactions.len(), letters, HOMES);
     let unit = |id: usize| {
         let body = Body { id: id as u32, updates: 0, value: id as u32 + 1 };
         if body.id >= setup.solitary_from { UnitSlot::solitary(body) } else { UnitSlot::new(body) }
@@ -252,11 +252,14 @@ pub(crate) fn build_with<W: Waiting + 'static>(
         queues: lend_slice(queues, |_| QueueSlot::new()),
     };
     let Setup { broad_phase, entry, tokens, .. } = setup;
-    let config = Config { broad_phase, entry, tokens };
+    let config = Config { broad_phase, entry, tokens, homes: HOMES as u32 };
     let pipeline = lend(Pipeline::new(memory, config, waiting).unwrap());
     pipeline.run(setup.frames).unwrap();
     (pipeline, lend(World { setup, journal: Mutex::default(), values: Mutex::new(vec![0; units]) }))
 }
+
+/// Of two units each has a home of its own, so that workers meet both at home and elsewhere.
+const HOMES: usize = 2;
 
 /// A pipeline whose workers spin where they wait.
 pub(crate) fn build(setup: Setup) -> (&'static Piped<Spin>, &'static World) {

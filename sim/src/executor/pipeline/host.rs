@@ -153,7 +153,8 @@ impl<'s> Environment for Host<'s> {
         let mail = letters.iter().map(|(from, parcel)| (parcel.to, *from, &parcel.message));
         let Unit { block, pairs } = unit;
         *pairs = PairCount::default();
-        for interaction in inputs.interactions() {
+        // The block brings them into its objects' order itself.
+        for interaction in inputs.interactions_in_any_order() {
             if interaction.other >= id {
                 *pairs += *interaction.state;
             }

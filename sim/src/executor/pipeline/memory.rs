@@ -31,14 +31,19 @@ pub(super) struct Tables {
     segments: Vec<SegmentSlot>,
     letters: Vec<LetterSlot<Parcel>>,
     queues: Vec<QueueSlot>,
+    homes: usize,
 }
 
 impl Tables {
-    pub(super) fn new(blocks: &[Block], interactions: Vec<InteractionSlot<PairCount>>) -> Self {
+    pub(super) fn new(
+        blocks: &[Block],
+        interactions: Vec<InteractionSlot<PairCount>>,
+        homes: usize,
+    ) -> Self {
         let objects: usize = blocks.iter().map(|block| block.objects().len()).sum();
         let contacts = 2 * (objects * CONTACTS_PER_OBJECT + FEWEST_CONTACTS);
         let letters = objects * LETTERS_PER_OBJECT + FEWEST_LETTERS;
-        let queues = queue_slots(blocks.len(), interactions.len(), letters);
+        let queues = queue_slots(blocks.len(), interactions.len(), letters, homes);
         Self {
             units: Vec::with_capacity(blocks.len()),
             interactions,
@@ -46,6 +51,7 @@ impl Tables {
             segments: filled(contacts, SegmentSlot::new),
             letters: filled(letters, LetterSlot::new),
             queues: filled(queues, QueueSlot::new),
+            homes,
         }
     }
 
@@ -87,7 +93,7 @@ impl Tables {
         let size = self.letters.len().max(2 * posted);
         if size > self.letters.len() {
             self.letters.resize_with(size, LetterSlot::new);
-            let queues = queue_slots(self.units.len(), self.interactions.len(), size);
+            let queues = queue_slots(self.units.len(), self.interactions.len(), size, self.homes);
             self.queues.resize_with(queues, QueueSlot::new);
         }
     }

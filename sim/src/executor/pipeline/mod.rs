@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use dualframe_core::error::TableFull;
 use dualframe_core::inbox::From;
-use dualframe_core::pipeline::{BroadPhase, Config, Pipeline};
+use dualframe_core::pipeline::{BroadPhase, Config, MOST_HOMES, Pipeline};
 
 pub use dualframe_core::frame::Entry;
 
@@ -65,12 +65,13 @@ impl PipelineExecutor {
             Grain::Spatial => (BroadPhase::Spatial, spare_interactions(blocks.len())),
             Grain::Pairwise => (BroadPhase::Pairwise, modelled_interactions(&stages, &blocks)),
         };
+        let homes = pool.threads().min(MOST_HOMES);
         Ok(Self {
-            tables: Tables::new(&blocks, interactions),
+            tables: Tables::new(&blocks, interactions, homes),
             stages,
             blocks,
             blocking,
-            config: Config { broad_phase, entry, tokens: 1 },
+            config: Config { broad_phase, entry, tokens: 1, homes: homes as u32 },
             grain,
             pool,
             frame: 0,
@@ -100,6 +101,7 @@ impl PipelineExecutor {
         let regrouping = Regrouping {
             blocking: (self.grain == Grain::Spatial).then_some(&mut self.blocking),
             mail: &mut self.mail,
+            homes: self.config.homes,
             most_contacts,
         };
         let (done, hiring) = context.run(

@@ -30,6 +30,7 @@ pub(super) struct Regrouping<'x> {
     pub(super) blocking: Option<&'x mut Blocking>,
     /// Messages for the next frame.
     pub(super) mail: &'x mut Vec<(From, Parcel)>,
+    pub(super) homes: u32,
     /// Contact records of a frame beyond which the tables are to grow.
     pub(super) most_contacts: usize,
 }
@@ -63,10 +64,12 @@ impl Regrouping<'_> {
         let Some(blocking) = self.blocking.as_deref_mut() else { return Ok(()) };
         pipeline.objects_mut().for_each(|unit| blocking.drain(&mut unit.block));
         blocking.split();
+        blocking.deal(self.homes);
         for (index, unit) in pipeline.objects_mut().enumerate() {
             blocking.fill(index, &mut unit.block);
             shared.locate(index, &unit.block);
         }
+        pipeline.set_homes(|unit| blocking.home(unit.index()));
         self.take_mail(pipeline);
         self.post_mail(shared, pipeline)
     }
@@ -198,7 +201,7 @@ impl<'s> Context<'s, '_> {
         host: &Host<'s>,
         token: Option<Token<'p, Screen<'s>>>,
     ) -> Option<Token<'p, Screen<'s>>> {
-        let mut worker = pipeline.worker().probed(StageClock::start());
+        let mut worker = pipeline.worker_at(index as u32).probed(StageClock::start());
         if let Some(token) = token
             && let Err(token) = worker.hold(token)
         {
