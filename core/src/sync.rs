@@ -47,10 +47,8 @@ impl Site {
     /// Lets shuttle schedule another thread before the access, unless the protocol keeps all others
     /// away from what is accessed: between two accesses that race, those make no difference.
     fn effective(self) -> Ordering {
-        const UNDISTURBED: [Site; 8] = [
+        const UNDISTURBED: [Site; 6] = [
             site::EXCLUSIVE,
-            site::ARRIVALS_LINK,
-            site::ARRIVALS_FOLLOW,
             site::LIST_LINK,
             site::LIST_FOLLOW,
             site::CANDIDATE_HEAD,

@@ -23,8 +23,17 @@ fn setups() -> impl Strategy<Value = (Setup, u32)> {
     (broad_phase, entry, sizes, chances).prop_map(|(broad_phase, entry, sizes, chances)| {
         let (units, frames, tokens, workers) = sizes;
         let (seed, near_percent, solitary) = chances;
-        let setup =
-            Setup { units, frames, broad_phase, entry, tokens, seed, near_percent, solitary };
+        let setup = Setup {
+            units,
+            frames,
+            broad_phase,
+            entry,
+            tokens,
+            homes: 2,
+            seed,
+            near_percent,
+            solitary,
+        };
         (setup, workers)
     })
 }

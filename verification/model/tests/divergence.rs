@@ -17,7 +17,8 @@ use record::{Park, Setup, judge, run};
 fn real(broad_phase: BroadPhase, entry: Entry) -> (Config, Vec<Seen>) {
     let (tokens, seed, near_percent, solitary) = (1, 5, 60, 0);
     let (units, frames) = (4, 3);
-    let setup = Setup { units, frames, broad_phase, entry, tokens, seed, near_percent, solitary };
+    let setup =
+        Setup { units, frames, broad_phase, entry, tokens, homes: 2, seed, near_percent, solitary };
     let (record, values) = run(&setup, 3, Park::default());
     judge(&setup, &record, &values);
     replay(&setup.model(), &record).expect("unchanged, it is the model's");

@@ -27,7 +27,7 @@ fn setups() -> impl Iterator<Item = Setup> {
     (1..).zip(ways).map(|(seed, ((broad_phase, entry), tokens))| {
         let (units, frames, near_percent) = (5, 3, 40);
         let solitary = if tokens == 2 { 4 } else { 0 };
-        Setup { units, frames, broad_phase, entry, tokens, seed, near_percent, solitary }
+        Setup { units, frames, broad_phase, entry, tokens, homes: 2, seed, near_percent, solitary }
     })
 }
 

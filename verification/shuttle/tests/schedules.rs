@@ -33,7 +33,17 @@ const WAYS: [(BroadPhase, Entry); 4] = [
 
 fn setup((broad_phase, entry): (BroadPhase, Entry)) -> Setup {
     let (tokens, seed, near_percent, solitary) = (1, 7, 15, 0);
-    Setup { units: 12, frames: 4, broad_phase, entry, tokens, seed, near_percent, solitary }
+    Setup {
+        units: 12,
+        frames: 4,
+        broad_phase,
+        entry,
+        tokens,
+        homes: 2,
+        seed,
+        near_percent,
+        solitary,
+    }
 }
 
 /// Runs `schedules` schedules of `scheduler`'s making in each way, and asserts that it did.

@@ -79,7 +79,7 @@ fn stint<'p, 'a: 'p, W: Waiting>(
 ) {
     let (env, see) = (*host, |event| host.recorder.see(host.worker, event));
     see(Event::Join);
-    let mut worker = pipeline.worker().probed(env);
+    let mut worker = pipeline.worker_at(host.worker).probed(env);
     let (mut holds, mut tired) = (false, false);
     while !pipeline.finished() && (stays || !tired || holds || !is_empty(shop)) {
         if worker.step(&env).expect("memory for all") != Step::Idle {

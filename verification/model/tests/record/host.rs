@@ -23,6 +23,7 @@ pub(crate) struct Setup {
     pub(crate) broad_phase: BroadPhase,
     pub(crate) entry: Entry,
     pub(crate) tokens: u32,
+    pub(crate) homes: u32,
     /// Decides which pairs are modelled, and which are near in which frame.
     pub(crate) seed: u64,
     /// Of a hundred pairs, how many are near.

@@ -44,7 +44,7 @@ impl Slots {
         };
         let records = 4 * pairs.len();
         let units = setup.units as usize;
-        let queues = queue_slots(units, interactions.len(), 0);
+        let queues = queue_slots(units, interactions.len(), 0, setup.homes as usize);
         let unit = |id| {
             let body = Body::new(id);
             if setup.is_solitary(id) { UnitSlot::solitary(body) } else { UnitSlot::new(body) }
@@ -73,8 +73,8 @@ impl Slots {
             letters: &mut self.letters,
             queues: &mut self.queues,
         };
-        let config =
-            Config { broad_phase: setup.broad_phase, entry: setup.entry, tokens: setup.tokens };
+        let Setup { broad_phase, entry, tokens, homes, .. } = *setup;
+        let config = Config { broad_phase, entry, tokens, homes };
         let mut pipeline = Pipeline::new(memory, config, waiting).expect("memory that fits");
         pipeline.run(setup.frames).expect("a pipeline at rest");
         pipeline
