@@ -1,4 +1,5 @@
-//! The only file that names atomics, fences and cells: `core`'s, `portable-atomic`'s, or loom's.
+//! The only file that names atomics, fences and cells: `core`'s, `portable-atomic`'s, or loom's. Under
+//! shuttle, which runs all threads on one, they are `core`'s, and each access lets others run first.
 //!
 //! Every atomic access elsewhere passes a [`Site`]: a name and the memory order that
 //! `core/PROTOCOL.md` gives it a reason for. An access without a site does not compile, and
@@ -57,10 +58,30 @@ pub struct Site {
     pub order: Ordering,
 }
 
-#[cfg(not(loom))]
+#[cfg(not(any(loom, shuttle)))]
 impl Site {
     #[inline(always)]
     fn effective(self) -> Ordering {
+        self.order
+    }
+}
+
+#[cfg(shuttle)]
+impl Site {
+    /// Lets shuttle schedule another thread before the access, unless the protocol keeps all others
+    /// away from what is accessed: between two accesses that race, those make no difference.
+    fn effective(self) -> Ordering {
+        const UNDISTURBED: [Site; 6] = [
+            site::EXCLUSIVE,
+            site::LIST_LINK,
+            site::LIST_FOLLOW,
+            site::CANDIDATE_HEAD,
+            site::SLOT_FIELD,
+            site::FRAME_TAG,
+        ];
+        if !UNDISTURBED.iter().any(|site| site.name == self.name) {
+            shuttle::sync::atomic::AtomicBool::new(false).load(Ordering::SeqCst);
+        }
         self.order
     }
 }
@@ -276,7 +297,9 @@ pub(crate) fn spin_hint() {
     crate::instrument::retried();
     #[cfg(loom)]
     loom::hint::spin_loop();
-    #[cfg(not(loom))]
+    #[cfg(shuttle)]
+    shuttle::hint::spin_loop();
+    #[cfg(not(any(loom, shuttle)))]
     ::core::hint::spin_loop();
 }
 

@@ -1,0 +1,223 @@
+//! The protocol as a model that `stateright` explores.
+
+use stateright::{Model, Property};
+
+use crate::config::{Bug, Config};
+use crate::state::{At, Rule, State};
+use crate::step::{Act, Step};
+use crate::waiting::Call;
+use crate::work::{Work, indices};
+
+/// The protocol, in one configuration.
+#[derive(Clone, Debug)]
+pub struct Protocol(pub Config);
+
+/// A worker and what it does.
+pub type Action = (u8, Act);
+
+impl Protocol {
+    /// What `worker` may do in `state`.
+    pub fn acts(&self, state: &State, worker: u8, acts: &mut Vec<Action>) {
+        let config = &self.0;
+        let me = &state.workers[worker as usize];
+        let mut may = |act| acts.push((worker, act));
+        let carries: &[bool] = if config.sleep { &[false, true] } else { &[false] };
+        match me.at {
+            At::Gone => {}
+            At::Outside if state.finished(config) => {}
+            At::Outside => may(Act::Join),
+            At::Awake => self.awake(state, worker, &mut may),
+            At::Entering(unit) => {
+                // Whether a unit asks about itself before or after it arrives is all one.
+                let itself = config.pair_within(unit).filter(|&pair| state.is_due(unit, pair));
+                itself.into_iter().for_each(|pair| self.tests(pair, &mut may));
+                may(Act::Go { carry: false });
+            }
+            At::Testing(_, left) => {
+                indices(left).for_each(|pair| self.tests(pair as u8, &mut may));
+            }
+            At::Arriving(_, left) => {
+                let pair = left.trailing_zeros();
+                if state.arrived >> pair & 1 == 1 {
+                    self.tests(pair as u8, &mut may);
+                } else {
+                    may(Act::Go { carry: false });
+                }
+            }
+            At::Interacting(_) | At::Updating(_) | At::Rendering(_) => {
+                carries.iter().for_each(|&carry| may(Act::Call { carry }));
+            }
+            At::Swapping => may(Act::Call { carry: false }),
+            At::Opening(..)
+            | At::Interacted(_)
+            | At::Advancing(_)
+            | At::Rendered(_)
+            | At::Reentering(_) => carries.iter().for_each(|&carry| may(Act::Go { carry })),
+            At::Ringing | At::Leaving { .. } => self.rings(state, worker, &mut may),
+            At::Asleep => {}
+            _ => may(Act::Go { carry: false }),
+        }
+    }
+
+    fn awake(&self, state: &State, worker: u8, may: &mut impl FnMut(Act)) {
+        let config = &self.0;
+        let me = &state.workers[worker as usize];
+        if state.finished(config) {
+            return;
+        }
+        let blind = config.has(Bug::RenderedAhead) && me.holds;
+        let seen = state.queue.iter().filter(|work| blind && matches!(work, Work::Render(_)));
+        let mut work = me.carried;
+        state.visible(me.holds).chain(seen).for_each(|visible| _ = work.put(visible));
+        work.iter().for_each(|work| may(Act::Take(work)));
+        let others = state.workers.iter().filter(|worker| worker.is_present()).count() - 1;
+        if me.holds && state.handovers > 0 && others > 0 {
+            may(Act::Release);
+        }
+        if !me.holds && state.tokens > 0 {
+            may(Act::Hold);
+        }
+        if !me.carried.is_empty() && config.sleep {
+            may(Act::Share);
+        }
+        if state.departures > 0 && others > 0 && !me.holds && !me.offers {
+            may(Act::Leave);
+        }
+        if config.sleep && work.is_empty() && !me.offers {
+            may(Act::Go { carry: false });
+        }
+    }
+
+    fn tests(&self, pair: u8, may: &mut impl FnMut(Act)) {
+        let carries: &[bool] = if self.0.sleep { &[false, true] } else { &[false] };
+        carries.iter().for_each(|&carry| may(Act::Test { pair, near: true, carry }));
+        if self.0.may_miss {
+            may(Act::Test { pair, near: false, carry: false });
+        }
+    }
+
+    /// A ring wakes any of those that are counted, as many as are called.
+    fn rings(&self, state: &State, worker: u8, may: &mut impl FnMut(Act)) {
+        let call = Call::of(&self.0, state, worker as usize);
+        let counted = |holders: bool| {
+            let workers = state.workers.iter().enumerate();
+            let of_bell =
+                workers.filter(|(_, worker)| worker.is_counted_asleep() && worker.holds == holders);
+            of_bell.fold(0_u8, |bits, (number, _)| bits | 1 << number)
+        };
+        let [others, holders] =
+            [false, true].map(|holders| (counted(holders), call.woken(state, holders)));
+        let all = others.0 | holders.0;
+        for woken in (0..=all).filter(|woken| woken & !all == 0) {
+            let fits = |(bell, count): (u8, usize)| (woken & bell).count_ones() as usize == count;
+            if fits(others) && fits(holders) {
+                may(Act::Ring { woken });
+            }
+        }
+    }
+
+    /// Whether nobody will do anything unless the host does, though frames are left or workers are
+    /// not between two steps.
+    pub fn is_stuck(&self, state: &State) -> bool {
+        let mut acts = vec![];
+        for worker in 0..state.workers.len() {
+            self.acts(state, worker as u8, &mut acts);
+        }
+        let by_host = |act: &Act| matches!(act, Act::Join | Act::Leave | Act::Release | Act::Share);
+        if acts.iter().any(|(_, act)| !by_host(act)) {
+            return false;
+        }
+        let at_rest = |at: At| matches!(at, At::Awake | At::Gone | At::Outside);
+        !state.finished(&self.0) || !state.workers.iter().all(|worker| at_rest(worker.at))
+    }
+}
+
+/// The names of the properties.
+pub mod property {
+    use crate::state::Rule;
+
+    /// Invariant 5.
+    pub const ACCESS: &str = "5 access: an update has its unit alone";
+    /// Invariant 6.
+    pub const TOKEN: &str = "6 token: as many as there are, and none renders without";
+    /// Invariant 7.
+    pub const PROGRESS: &str = "7 progress: nobody is stuck while frames are left";
+    /// Not a property that may fail: the model comes to its end.
+    pub const FINISHES: &str = "all frames are swapped";
+    /// Nor this one: two frames are in flight.
+    pub const OVERLAPS: &str = "a unit is updated while the frame before is not swapped";
+    /// Nor this one.
+    pub const SLEEPS: &str = "somebody sleeps while frames are left";
+
+    /// The property that a broken rule breaks.
+    pub const fn of(rule: Rule) -> &'static str {
+        match rule {
+            Rule::ExactlyOnce => "1 exactly once",
+            Rule::Order => "2 order",
+            Rule::Swap => "3 swap",
+            Rule::TwoFrames => "4 two frames",
+            Rule::Token => TOKEN,
+        }
+    }
+}
+
+impl Model for Protocol {
+    type State = State;
+    type Action = Action;
+
+    fn init_states(&self) -> Vec<State> {
+        vec![State::initial(&self.0)]
+    }
+
+    fn actions(&self, state: &State, actions: &mut Vec<Action>) {
+        if state.broken.is_none() {
+            for worker in 0..state.workers.len() {
+                self.acts(state, worker as u8, actions);
+            }
+        }
+    }
+
+    fn next_state(&self, state: &State, (worker, act): Action) -> Option<State> {
+        Some(Step::made(&self.0, state, worker as usize, act))
+    }
+
+    fn properties(&self) -> Vec<Property<Self>> {
+        vec![
+            Property::always(property::of(Rule::ExactlyOnce), |_, state: &State| {
+                state.broken != Some(Rule::ExactlyOnce)
+            }),
+            Property::always(property::of(Rule::Order), |_, state: &State| {
+                state.broken != Some(Rule::Order)
+            }),
+            Property::always(property::of(Rule::Swap), |_, state: &State| {
+                state.broken != Some(Rule::Swap)
+            }),
+            Property::always(property::of(Rule::TwoFrames), |_, state: &State| {
+                state.broken != Some(Rule::TwoFrames)
+            }),
+            Property::always(property::ACCESS, |model: &Self, state: &State| {
+                state.access(&model.0)
+            }),
+            Property::always(property::TOKEN, |model: &Self, state: &State| {
+                state.broken != Some(Rule::Token) && state.tokens(&model.0)
+            }),
+            Property::always(property::PROGRESS, |model: &Self, state: &State| {
+                state.broken.is_some() || !model.is_stuck(state)
+            }),
+            Property::sometimes(property::FINISHES, |model: &Self, state: &State| {
+                state.finished(&model.0)
+            }),
+            Property::sometimes(property::OVERLAPS, |_, state: &State| {
+                let updating = |at: At| match at {
+                    At::Updating(unit) => state.units[unit as usize].frame > state.display,
+                    _ => false,
+                };
+                state.workers.iter().any(|worker| updating(worker.at))
+            }),
+            Property::sometimes(property::SLEEPS, |model: &Self, state: &State| {
+                let asleep = state.workers.iter().any(|worker| worker.at == At::Asleep);
+                asleep && !state.finished(&model.0)
+            }),
+        ]
+    }
+}

@@ -1,0 +1,296 @@
+//! A state of the protocol.
+
+use std::fmt;
+
+use crate::config::Config;
+use crate::work::{Work, Works, indices};
+
+/// A rule that a transition has broken (DESIGN invariants 1 to 4 and 6). Access (5) and progress (7)
+/// are read off states.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Rule {
+    /// Something happened twice, or was lost.
+    ExactlyOnce,
+    /// An update came before what it waits for, or a test before the updates that it reads.
+    Order,
+    /// A frame was swapped before its last rendering, or rendered before the last swap.
+    Swap,
+    /// A unit was updated while the frame before last was not swapped.
+    TwoFrames,
+    /// Somebody rendered without a token.
+    Token,
+}
+
+/// A unit, as the protocol sees it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Unit {
+    /// The frame of its next update.
+    pub frame: u8,
+    /// What has to happen before that.
+    pub pending: u8,
+    /// How often it was rendered.
+    pub rendered: u8,
+}
+
+/// What a worker goes on with after its unit has left the gate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Then {
+    /// It is done.
+    End,
+    /// It takes the rendering of this unit off the unit's countdown.
+    Rendered(u8),
+    /// It lets units from this number on enter the next frame.
+    Enter(u8),
+}
+
+/// Where a worker is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum At {
+    /// Not joined yet.
+    Outside,
+    /// Left for good.
+    Gone,
+    /// Between two steps.
+    Awake,
+    /// Begun to enter a unit.
+    Entering(u8),
+    /// Entering: pairs that are to be arrived at (`Pairwise`).
+    Arriving(u8, u64),
+    /// Entering: pairs that are to be tested (`Spatial`).
+    Testing(u8, u64),
+    /// About to leave the gate with this unit.
+    AtGate(u8, Then),
+    /// Leaves counts that it owes these pairs (a seeded bug only).
+    CountingLate(u64, Then),
+    /// Takes the frame's opening off all units' countdowns, from this one on.
+    Opening(u8, Then),
+    /// In the callback of an interaction.
+    Interacting(u8),
+    /// Takes the interaction off the countdown of its second end.
+    Interacted(u8),
+    /// In the callback of an update.
+    Updating(u8),
+    /// Lets the unit enter its next frame.
+    Advancing(u8),
+    /// Arms the unit's countdown late (a seeded bug only).
+    ArmingLate(u8),
+    /// In the callback of a rendering.
+    Rendering(u8),
+    /// Takes the rendering off the unit's countdown.
+    Rendered(u8),
+    /// Takes the rendering off the frame's.
+    Counting,
+    /// In the callback of a swap.
+    Swapping,
+    /// Lets units enter the next frame, from this one on, after a swap.
+    Reentering(u8),
+    /// Announces what it has queued.
+    Ringing,
+    /// Leaves, for good or without its token: looks at what is left behind, and rings for it.
+    Leaving {
+        /// For good.
+        gone: bool,
+    },
+    /// Its step found nothing to do: it will sleep.
+    Idle,
+    /// Has announced that it will sleep; rung since or not.
+    Announced(bool),
+    /// Has looked again and found nothing; rung since it announced itself or not.
+    Looked(bool),
+    /// Asleep.
+    Asleep,
+    /// Awake, and still counted among the sleepers.
+    Returning,
+}
+
+/// A worker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Worker {
+    /// Where it is.
+    pub at: At,
+    /// What it carries.
+    pub carried: Works,
+    /// Whether it holds a token.
+    pub holds: bool,
+    /// Whether it has laid a token down that nobody has taken yet: it neither sleeps nor leaves.
+    pub offers: bool,
+    /// Work units queued and not announced, at most as many as there are workers.
+    pub queued: u8,
+    /// The same of renderings.
+    pub renders: u8,
+    /// Pairs that are not counted yet (a seeded bug only).
+    pub uncounted: u64,
+}
+
+impl Worker {
+    fn new(at: At, holds: bool) -> Self {
+        Self {
+            at,
+            carried: Works::default(),
+            holds,
+            offers: false,
+            queued: 0,
+            renders: 0,
+            uncounted: 0,
+        }
+    }
+
+    /// Whether others count it among a bell's sleepers.
+    pub(crate) fn is_counted_asleep(&self) -> bool {
+        matches!(self.at, At::Announced(_) | At::Looked(_) | At::Asleep | At::Returning)
+    }
+
+    pub(crate) fn is_present(&self) -> bool {
+        !matches!(self.at, At::Outside | At::Gone)
+    }
+}
+
+/// A state of everything.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct State {
+    /// Units.
+    pub units: Vec<Unit>,
+    /// In how many frames each pair was tested.
+    pub tests: Vec<u8>,
+    /// Workers.
+    pub workers: Vec<Worker>,
+    /// What is queued, wherever.
+    pub queue: Works,
+    /// Units that have arrived (`Spatial`), or pairs with one end that has (`Pairwise`), a bit each.
+    pub arrived: u64,
+    /// Candidates whose interaction has not ended, a bit each.
+    pub found: u64,
+    /// Units that have not left the gate.
+    pub gate: u8,
+    /// Units of the frame on display that are not rendered.
+    pub renders: u8,
+    /// The frame on display.
+    pub display: u8,
+    /// Tokens that nobody holds.
+    pub tokens: u8,
+    /// How many workers may still leave.
+    pub departures: u8,
+    /// How often a token may still be given away.
+    pub handovers: u8,
+    /// The rule that the last transition has broken.
+    pub broken: Option<Rule>,
+}
+
+impl State {
+    /// All units are about to enter the first frame.
+    pub fn initial(config: &Config) -> Self {
+        let unit = Unit { frame: 0, pending: 1, rendered: 0 };
+        let mut queue = Works::default();
+        (0..config.units).for_each(|unit| _ = queue.put(Work::Enter(unit)));
+        let present = config.workers - config.late;
+        let worker = |number| {
+            let at = if number < present { At::Awake } else { At::Outside };
+            Worker::new(at, number < config.tokens.min(present))
+        };
+        Self {
+            units: vec![unit; config.units as usize],
+            tests: vec![0; config.pairs.len()],
+            workers: (0..config.workers).map(worker).collect(),
+            queue,
+            arrived: 0,
+            found: 0,
+            gate: config.units,
+            renders: config.units,
+            display: 0,
+            tokens: config.tokens.saturating_sub(present),
+            departures: config.departures,
+            handovers: config.handovers,
+            broken: None,
+        }
+    }
+
+    /// The same state for all orders of the workers, who are all alike.
+    #[must_use]
+    pub fn representative(&self) -> Self {
+        let mut state = self.clone();
+        state.workers.sort_unstable();
+        state
+    }
+
+    /// Whether every frame is swapped.
+    pub fn finished(&self, config: &Config) -> bool {
+        self.display == config.frames
+    }
+
+    pub(crate) fn unit(&mut self, unit: u8) -> &mut Unit {
+        &mut self.units[unit as usize]
+    }
+
+    /// What `worker` would find in the queues.
+    pub(crate) fn visible(&self, holder: bool) -> impl Iterator<Item = Work> {
+        self.queue.iter().filter(move |work| match *work {
+            Work::Render(unit) => holder && self.is_displayed(unit),
+            _ => true,
+        })
+    }
+
+    /// Whether the frame of `unit`'s last update is on display.
+    pub(crate) fn is_displayed(&self, unit: u8) -> bool {
+        self.units[unit as usize].frame == self.display + 1
+    }
+
+    /// Whether `pair` is still to be tested in the frame that `unit` enters.
+    pub(crate) fn is_due(&self, unit: u8, pair: u8) -> bool {
+        self.tests[pair as usize] == self.units[unit as usize].frame
+    }
+
+    /// Invariant 5: nobody else has a unit that is updated.
+    pub fn access(&self, config: &Config) -> bool {
+        let writes = |worker: &Worker| match worker.at {
+            At::Updating(unit) => 1_u64 << unit,
+            _ => 0,
+        };
+        let reads = |worker: &Worker| match worker.at {
+            At::Entering(unit) => 1 << unit,
+            At::Testing(_, pairs) => {
+                let ends = indices(pairs).flat_map(|pair| config.ends(pair as u8));
+                ends.fold(0, |bits, end| bits | 1_u64 << end)
+            }
+            At::Interacting(pair) => config.ends(pair).fold(0, |bits, end| bits | 1 << end),
+            At::Rendering(unit) => 1 << unit,
+            _ => 0,
+        };
+        let mut written = 0;
+        for worker in &self.workers {
+            let mine = writes(worker);
+            if written & mine != 0 {
+                return false;
+            }
+            written |= mine;
+        }
+        self.workers.iter().all(|worker| reads(worker) & written == 0)
+    }
+
+    /// Invariant 6: no more tokens than there are.
+    pub fn tokens(&self, config: &Config) -> bool {
+        let held = self.workers.iter().filter(|worker| worker.holds).count();
+        held + self.tokens as usize <= config.tokens as usize
+    }
+}
+
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { queue, gate, renders, display, tokens, .. } = self;
+        writeln!(f, "    queued {queue:?}; frame {display} is on display, {renders} to render;")?;
+        writeln!(f, "    {gate} before the gate; {tokens} tokens lie about")?;
+        for (number, unit) in self.units.iter().enumerate() {
+            let Unit { frame, pending, rendered } = unit;
+            writeln!(
+                f,
+                "    unit {number}: next update is frame {frame}'s, waits for {pending}; \
+                 rendered {rendered} times"
+            )?;
+        }
+        for (number, worker) in self.workers.iter().enumerate() {
+            let Worker { at, carried, .. } = worker;
+            let token = if worker.holds { " with a token" } else { "" };
+            writeln!(f, "    worker {number}{token}: {at:?}, carries {carried:?}")?;
+        }
+        Ok(())
+    }
+}
