@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use glam::Vec3;
 
-use crate::behavior::{Input, Segment, Workspace};
+use crate::behavior::{Input, Segment, Workspace, batch};
 use crate::block::{Block, Gathered};
 use crate::interaction::{Contact, ContactSink, Rules, Scratch, TableFull};
 use crate::message::Message;
@@ -141,7 +141,7 @@ impl Stages {
         let Gathered { records, segments, workspace } = &mut block.gathered;
         segments.sort_unstable_by_key(|segment| (segment.object, segment.other));
         let mut rest = segments.as_slice();
-        for object in &mut block.objects {
+        for (place, object) in block.objects.iter_mut().enumerate() {
             let own = rest.partition_point(|segment| segment.object <= object.id());
             let (segments, others) = rest.split_at(own);
             rest = others;
@@ -156,8 +156,12 @@ impl Stages {
             let id = object.id();
             let own_mail =
                 mail.clone().filter(move |&(to, ..)| to == id).map(|(.., message)| message);
-            let given = Given { frame, segments, records, workspace: &mut *workspace };
+            let given = Given { frame, place, segments, records, workspace: &mut *workspace };
             self.update_object(object, given, own_mail, post);
+        }
+        batch::advance(&mut block.objects, workspace, self.simd);
+        for waiting in workspace.waiting.drain(..) {
+            block.objects[waiting.place].refresh(frame);
         }
         block.gathered.clear();
         block.refresh();
@@ -170,7 +174,7 @@ impl Stages {
         mail: impl Iterator<Item = &'m Message>,
         post: &mut dyn FnMut(ObjectId, ObjectId, Message),
     ) {
-        let frame = given.frame;
+        let Given { frame, place, .. } = given;
         let began = self.callback_budget.map(|budget| (Instant::now(), budget));
         let mut input = Input {
             frame,
@@ -183,16 +187,23 @@ impl Stages {
             workspace: given.workspace,
             post,
         };
+        let mut waits = false;
         let done = catch_unwind(AssertUnwindSafe(|| {
             for message in mail {
                 object.process(message, frame);
             }
             if object.quarantined().is_none() && !object.is_fixed() {
-                object.behavior.update(&mut object.geometry, &mut input);
+                // Together no object has a time of its own to measure.
+                waits = self.callback_budget.is_none() && batch::begin(object, place, &mut input);
+                if !waits {
+                    object.behavior.update(&mut object.geometry, &mut input);
+                }
             }
         }));
         if done.is_err() {
             object.quarantine(Fault { kind: FaultKind::Panicked, frame });
+        } else if waits {
+            // See `update`.
         } else if began.is_some_and(|(began, budget)| began.elapsed() > budget) {
             object.quarantine(Fault { kind: FaultKind::OverBudget, frame });
         } else if object.quarantined().is_none() {
@@ -218,6 +229,8 @@ pub(crate) fn draw(object: &Object, renderer: &mut dyn Renderer) {
 /// What an object's update is given by its block.
 struct Given<'a> {
     frame: u64,
+    /// The object's place in the block.
+    place: usize,
     segments: &'a [Segment],
     records: &'a [Contact],
     workspace: &'a mut Workspace,

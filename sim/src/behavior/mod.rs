@@ -1,10 +1,13 @@
 //! The behaviour manager of an object (Fig. 2): how it changes from frame to frame.
 
+mod abreast;
+pub(crate) mod batch;
 mod fixed;
 mod mass_spring;
 mod scripted;
 #[allow(unsafe_code)]
 mod spring_kernel;
+mod spring_law;
 
 use std::any::Any;
 use std::hash::Hasher;
@@ -87,4 +90,8 @@ pub(crate) struct Workspace {
     pulled: Vec<Lanes3>,
     /// Where positions and velocities are looked up.
     tables: [Vec<Quad>; 2],
+    /// Of several bodies.
+    abreast: abreast::Nodes,
+    /// Bodies whose springs are left to be advanced.
+    pub(crate) waiting: Vec<batch::Waiting>,
 }

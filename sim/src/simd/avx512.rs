@@ -3,8 +3,8 @@
 
 use std::arch::x86_64::*;
 
-use super::avx2::Avx2;
-use super::{Isa, Kernel, LaneSet, Lanes3, Quad};
+use super::avx2::{Avx2, Avx2Half};
+use super::{Arithmetic, Isa, Kernel, LaneSet, Lanes3, Quad};
 use crate::geometry::{LANES, Lanes};
 
 /// The proof that the machine has AVX-512F. There is none without.
@@ -35,9 +35,9 @@ fn with_avx512<K: Kernel>(avx512: Avx512, kernel: K) -> K::Output {
     kernel.run(avx512)
 }
 
-impl Isa for Avx512 {
+impl Arithmetic for Avx512 {
+    type Lanes = Lanes;
     type Vector = __m512;
-    type Table<'a> = [[__m512; 3]; Avx512::MOST_CHUNKS];
 
     #[inline(always)]
     fn splat(self, value: f32) -> __m512 {
@@ -86,6 +86,16 @@ impl Isa for Avx512 {
         // SAFETY: as in `splat`.
         unsafe { _mm512_sqrt_ps(a) }
     }
+}
+
+impl Isa for Avx512 {
+    type Half = Avx2Half;
+    type Table<'a> = [[__m512; 3]; Avx512::MOST_CHUNKS];
+
+    #[inline(always)]
+    fn half(self) -> Avx2Half {
+        self.0.half()
+    }
 
     #[inline(always)]
     fn sum(self, vector: __m512) -> f32 {
@@ -94,7 +104,7 @@ impl Isa for Avx512 {
             let upper = _mm512_extractf64x4_pd::<1>(_mm512_castps_pd(vector));
             _mm256_add_ps(_mm512_castps512_ps256(vector), _mm256_castpd_ps(upper))
         };
-        self.0.sum_of_half(half)
+        self.half().sum(half)
     }
 
     #[inline(always)]

@@ -1,0 +1,104 @@
+//! Which mass–spring bodies of a block are advanced together.
+//!
+//! How many bodies are side by side, and which, never shows in the results.
+
+use std::any::Any;
+use std::cmp::Reverse;
+use std::sync::Arc;
+
+use super::abreast::{AdvanceAbreast, MOST};
+use super::spring_kernel::{Advance, Springs};
+use super::{Input, MassSpring, Workspace};
+use crate::geometry::Mesh;
+use crate::object::Object;
+use crate::simd::Simd;
+
+/// The bodies that must move on average for a step side by side to cost less than their steps one by
+/// one; usually 4.
+const WORTH: u64 = 4;
+
+/// A body whose springs are left to be advanced.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Waiting {
+    /// Where the object is among those of its block.
+    pub(crate) place: usize,
+    /// Where its topology is in memory.
+    topology: usize,
+    springs: Springs,
+}
+
+impl Waiting {
+    /// Bodies of equal kinds can be side by side.
+    fn kind(&self) -> (usize, bool) {
+        (self.topology, self.springs.damping > 0.0)
+    }
+}
+
+/// Begins the update of an object that is a mass–spring body and nothing else: its springs then wait
+/// for [`advance`]. `false`, and nothing has happened, for any other object.
+pub(crate) fn begin(object: &mut Object, place: usize, input: &mut Input<'_>) -> bool {
+    let behavior: &dyn Any = &*object.behavior;
+    let Some(behavior) = behavior.downcast_ref::<MassSpring>() else { return false };
+    let Some(mesh) = object.geometry.as_mesh_mut().filter(|mesh| mesh.is_whole()) else {
+        return false;
+    };
+    let springs = behavior.begin(mesh, input);
+    let topology = Arc::as_ptr(mesh.topology()).addr();
+    input.workspace.waiting.push(Waiting { place, topology, springs });
+    true
+}
+
+/// Advances the springs of all bodies that wait.
+pub(crate) fn advance(objects: &mut [Object], workspace: &mut Workspace, simd: Simd) {
+    let mut waiting = std::mem::take(&mut workspace.waiting);
+    waiting.sort_unstable_by_key(|body| (body.kind(), Reverse(body.springs.substeps), body.place));
+    for mut alike in waiting.chunk_by(|a, b| a.kind() == b.kind()) {
+        while let [first, ..] = alike {
+            let (now, later) = alike.split_at(together(alike));
+            if now.len() > 1 {
+                advance_together(now, objects, workspace, simd);
+            } else if let Some(mesh) = objects[first.place].geometry.as_mesh_mut() {
+                advance_alone(mesh, first.springs, workspace, simd);
+            }
+            alike = later;
+        }
+    }
+    workspace.waiting = waiting;
+}
+
+/// How many of the first bodies are best advanced together.
+fn together(bodies: &[Waiting]) -> usize {
+    let most = &bodies[..bodies.len().min(MOST)];
+    let steps = |body: &Waiting| u64::from(body.springs.substeps);
+    let all: u64 = most.iter().map(steps).sum();
+    if all >= WORTH * steps(&bodies[0]) { most.len() } else { 1 }
+}
+
+fn advance_together(
+    bodies: &[Waiting],
+    objects: &mut [Object],
+    workspace: &mut Workspace,
+    simd: Simd,
+) {
+    let mut lanes = [const { None }; MOST];
+    for (place, object) in objects.iter_mut().enumerate() {
+        if let Some(lane) = bodies.iter().position(|body| body.place == place)
+            && let Some(mesh) = object.geometry.as_mesh_mut()
+        {
+            lanes[lane] = Some((mesh.kernel_parts(), bodies[lane].springs));
+        }
+    }
+    simd.run(AdvanceAbreast { bodies: lanes, nodes: &mut workspace.abreast });
+}
+
+/// Advances the springs of one body.
+pub(super) fn advance_alone(
+    mesh: &mut Mesh,
+    springs: Springs,
+    workspace: &mut Workspace,
+    simd: Simd,
+) {
+    let parts = mesh.kernel_parts();
+    let chunks = parts.topology.present().len();
+    simd.for_look_up(chunks).run(Advance { parts, workspace, springs });
+}
