@@ -76,7 +76,7 @@ impl Kernel for AdvanceAbreast<'_> {
             let law = Dashpot { damping: isa.load(&of(|springs| springs.damping)) };
             let time = isa.load(&of(|springs| springs.time));
             let step = Step { gravity: splat(isa, [0.0; 3]), time, drifts: false };
-            step.advance(isa, topology, nodes, [law, law], isa.splat(-1.0));
+            step.advance(isa, topology, nodes, [law, law], None);
         }
         let edges =
             Elastic { stiffness: isa.load(&of(|springs| springs.stiffness)), one: isa.splat(1.0) };
@@ -88,11 +88,14 @@ impl Kernel for AdvanceAbreast<'_> {
             isa.load(&of(|springs| springs.gravity[2])),
         ];
         let step = Step { gravity, time: isa.load(&of(Springs::step)), drifts: true };
-        let mut done = 0;
-        for last in (0..MOST).rev() {
-            let mut moving = [1.0; HALF];
-            moving[..=last].fill(-1.0);
-            let moving = isa.load(&moving);
+        let mut done = substeps[MOST - 1];
+        for _ in 0..done {
+            step.advance(isa, topology, nodes, [edges, to_center], None);
+        }
+        for last in (0..MOST - 1).rev() {
+            let mut moving = [0.0; HALF];
+            moving[..=last].fill(f32::from_bits(u32::MAX));
+            let moving = Some(isa.load(&moving));
             for _ in done..substeps[last] {
                 step.advance(isa, topology, nodes, [edges, to_center], moving);
             }
@@ -199,7 +202,7 @@ struct Step<V> {
 
 impl<V: Copy> Step<V> {
     /// Makes the step, with one law for the springs between nodes and another for those to the centre,
-    /// in the lanes where `moving` is less than 0.
+    /// in all lanes or those where the bits of `moving` are set.
     #[inline(always)]
     fn advance<H: HalfIsa<Vector = V>, L: Law<H>>(
         self,
@@ -207,7 +210,7 @@ impl<V: Copy> Step<V> {
         topology: &Topology,
         nodes: &mut Nodes,
         [edges, to_center]: [L; 2],
-        moving: V,
+        moving: Option<V>,
     ) {
         let shared = pull_to_center(isa, topology, nodes, to_center);
         edge_forces(isa, topology, nodes, edges);
@@ -235,10 +238,11 @@ impl<V: Copy> Step<V> {
 #[inline(always)]
 fn choose<H: HalfIsa>(
     isa: H,
-    chooser: H::Vector,
+    chooser: Option<H::Vector>,
     a: [H::Vector; 3],
     b: [H::Vector; 3],
 ) -> [H::Vector; 3] {
+    let Some(chooser) = chooser else { return a };
     [
         isa.choose(chooser, a[0], b[0]),
         isa.choose(chooser, a[1], b[1]),

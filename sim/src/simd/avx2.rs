@@ -175,7 +175,7 @@ impl HalfIsa for Avx2Half {
     #[inline(always)]
     fn choose(self, chooser: __m256, a: __m256, b: __m256) -> __m256 {
         // SAFETY: as in `splat`.
-        unsafe { _mm256_blendv_ps(b, a, chooser) }
+        unsafe { _mm256_or_ps(_mm256_and_ps(chooser, a), _mm256_andnot_ps(chooser, b)) }
     }
 }
 

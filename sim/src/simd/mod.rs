@@ -171,7 +171,7 @@ pub(crate) trait HalfIsa: Arithmetic<Lanes = HalfLanes> {
     /// Rows become columns.
     fn transpose(self, rows: [Self::Vector; HALF]) -> [Self::Vector; HALF];
 
-    /// In each lane `a` where `chooser` is less than 0, `b` elsewhere.
+    /// The bits of `a` where those of `chooser` are set, of `b` elsewhere.
     fn choose(self, chooser: Self::Vector, a: Self::Vector, b: Self::Vector) -> Self::Vector;
 }
 

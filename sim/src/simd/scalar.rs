@@ -89,7 +89,8 @@ impl HalfIsa for Plain<HALF> {
     fn choose(self, chooser: HalfLanes, a: HalfLanes, b: HalfLanes) -> HalfLanes {
         let mut chosen = b;
         for lane in 0..HALF {
-            chosen[lane] = if chooser[lane] < 0.0 { a[lane] } else { b[lane] };
+            let set = chooser[lane].to_bits();
+            chosen[lane] = f32::from_bits(set & a[lane].to_bits() | !set & b[lane].to_bits());
         }
         chosen
     }
