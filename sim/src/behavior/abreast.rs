@@ -261,21 +261,26 @@ fn edge_forces<H: HalfIsa, L: Law<H>>(isa: H, topology: &Topology, nodes: &mut N
     let mut from = first as usize;
     let mut force = load(isa, &forces[from].0);
     let mut own = [load(isa, &positions[from].0), load(isa, &velocities[from].0)];
-    for &Spring { nodes: [a, b], rest } in topology.springs() {
-        let (a, b) = (a as usize, b as usize);
+    for Spring { nodes: [a, b], rest } in topology.springs() {
+        let (a, b) = (*a as usize, *b as usize);
         if a != from {
             store(isa, force, &mut forces[from].0);
             from = a;
             force = load(isa, &forces[from].0);
             own = [load(isa, &positions[from].0), load(isa, &velocities[from].0)];
         }
-        let way = minus(isa, load(isa, &positions[b].0), own[0]);
-        let relative =
-            if L::NEEDS_VELOCITY { minus(isa, load(isa, &velocities[b].0), own[1]) } else { way };
-        let pull = law.pull(isa, way, relative, isa.splat(rest));
+        // The way from the second end, because what is subtracted may be in memory, and the same for
+        // the force on it.
+        let way = minus(isa, own[0], load(isa, &positions[b].0));
+        let relative = if L::NEEDS_VELOCITY {
+            minus(isa, own[1], load(isa, &velocities[b].0))
+        } else {
+            way
+        };
+        let pull = law.pull(isa, way, relative, isa.splat(*rest));
         let pulled = times(isa, way, pull);
-        force = plus(isa, force, pulled);
-        let other = minus(isa, load(isa, &forces[b].0), pulled);
+        force = minus(isa, force, pulled);
+        let other = plus(isa, load(isa, &forces[b].0), pulled);
         store(isa, other, &mut forces[b].0);
     }
     store(isa, force, &mut forces[from].0);

@@ -17,7 +17,7 @@ impl Avx512 {
 
     pub(super) fn detect() -> Option<Self> {
         let avx2 = Avx2::detect()?;
-        is_x86_feature_detected!("avx512f").then_some(Self(avx2))
+        (is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl")).then_some(Self(avx2))
     }
 
     pub(super) fn avx2(self) -> Avx2 {
@@ -30,7 +30,7 @@ impl Avx512 {
     }
 }
 
-#[target_feature(enable = "avx512f")]
+#[target_feature(enable = "avx512f,avx512vl")]
 fn with_avx512<K: Kernel>(avx512: Avx512, kernel: K) -> K::Output {
     kernel.run(avx512)
 }
