@@ -272,11 +272,8 @@ fn edge_forces<H: HalfIsa, L: Law<H>>(isa: H, topology: &Topology, nodes: &mut N
         // The way from the second end, because what is subtracted may be in memory, and the same for
         // the force on it.
         let way = minus(isa, own[0], load(isa, &positions[b].0));
-        let relative = if L::NEEDS_VELOCITY {
-            minus(isa, own[1], load(isa, &velocities[b].0))
-        } else {
-            way
-        };
+        let relative =
+            if L::NEEDS_VELOCITY { minus(isa, own[1], load(isa, &velocities[b].0)) } else { way };
         let pull = law.pull(isa, way, relative, isa.splat(*rest));
         let pulled = times(isa, way, pull);
         force = minus(isa, force, pulled);

@@ -17,7 +17,8 @@ impl Avx512 {
 
     pub(super) fn detect() -> Option<Self> {
         let avx2 = Avx2::detect()?;
-        (is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl")).then_some(Self(avx2))
+        (is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl"))
+            .then_some(Self(avx2))
     }
 
     pub(super) fn avx2(self) -> Avx2 {
