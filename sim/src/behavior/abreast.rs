@@ -1,60 +1,84 @@
 //! Mass–spring bodies of one topology side by side: a whole frame of several at once, a lane each.
 //!
 //! It comes to the same bits as a body by itself (see [`spring_kernel`]), at about half the cost: every
-//! spring is computed once, added at one end and subtracted at the other.
+//! spring is computed once, added at one end and subtracted at the other. As bodies make different
+//! numbers of substeps, two may share a lane: when the first is done the second takes its place.
 //!
 //! [`spring_kernel`]: super::spring_kernel
 
+use std::hint::black_box;
+
 use super::spring_kernel::Springs;
-use super::spring_law::{Dashpot, Elastic, Law, load, minus, plus, splat, store, times};
-use crate::geometry::{KernelParts, LANES, Lanes, Spring, Topology};
+use super::spring_law::{Dashpot, Elastic, Law, load, minus, plus, store, times};
+use crate::geometry::{KernelParts, LANES, Spring, Topology};
 use crate::simd::{Arithmetic, HALF, HalfIsa, HalfLanes, Isa, Kernel};
 
-/// The most bodies side by side.
-pub(super) const MOST: usize = HALF;
+/// The most bodies that share the lanes.
+pub(super) const MOST: usize = 2 * HALF;
 
-/// One number of each body, where loads and stores are fastest.
+/// The lane of a body by its place in descending order of substeps, and whether it comes second there:
+/// the longest shares with the shortest.
+pub(super) fn seat(place: usize) -> (usize, usize) {
+    if place < HALF { (0, place) } else { (1, MOST - 1 - place) }
+}
+
+/// One node of each body, where loads and stores are fastest.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+struct Node {
+    /// In metres.
+    position: [HalfLanes; 3],
+    /// In metres per second.
+    velocity: [HalfLanes; 3],
+    /// In kilograms.
+    mass: HalfLanes,
+    /// In 1/kg.
+    inverse_mass: HalfLanes,
+}
+
+impl Node {
+    #[inline(always)]
+    fn rows(&mut self) -> [&mut HalfLanes; ROWS] {
+        let ([x, y, z], [vx, vy, vz]) = (&mut self.position, &mut self.velocity);
+        [x, y, z, vx, vy, vz, &mut self.mass, &mut self.inverse_mass]
+    }
+}
+
+/// The numbers of a node.
+const ROWS: usize = 8;
+
+/// The force on one node of each body, in newtons.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(32))]
-struct Numbers(HalfLanes);
+struct Force([HalfLanes; 3]);
 
-/// One vector of each body, likewise.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(align(32))]
-struct Node([HalfLanes; 3]);
-
-/// The bodies' nodes, in whole [`LANES`] of them.
+/// Memory for the bodies' nodes.
 #[derive(Debug, Default)]
 pub(super) struct Nodes {
-    /// In metres.
-    positions: Vec<Node>,
-    /// In metres per second.
-    velocities: Vec<Node>,
-    /// In newtons.
-    forces: Vec<Node>,
-    /// In kilograms.
-    masses: Vec<Numbers>,
-    /// In 1/kg.
-    inverse_masses: Vec<Numbers>,
+    /// The bodies under way, and those which wait for a lane or are done; in whole [`LANES`] of nodes.
+    sets: [Vec<Node>; 2],
+    forces: Vec<Force>,
 }
 
 impl Nodes {
-    fn resize(&mut self, nodes: usize) {
-        for vectors in [&mut self.positions, &mut self.velocities, &mut self.forces] {
-            vectors.resize(nodes, Node::default());
+    /// Makes room for bodies of so many nodes.
+    pub(super) fn reserve(&mut self, nodes: usize) {
+        let room = nodes.next_multiple_of(LANES);
+        for set in &mut self.sets {
+            set.resize(set.len().max(room), Node::default());
         }
-        self.masses.resize(nodes, Numbers::default());
-        self.inverse_masses.resize(nodes, Numbers::default());
+        self.forces.resize(self.forces.len().max(room), Force::default());
     }
 }
 
 /// A body with its numbers.
 pub(super) type Body<'a> = (KernelParts<'a>, Springs);
 
-/// One frame of the bodies in the first lanes, in descending order of their substeps. They share
-/// their topology, whose number of nodes all their lists have, and are all damped or all not.
+/// One frame of some bodies: those first in the lanes and those second. The first lane has a body, and
+/// no lane has a second one without a first. All share their topology, whose number of nodes all their
+/// lists have, and are damped or all not.
 pub(super) struct AdvanceAbreast<'a> {
-    pub(super) bodies: [Option<Body<'a>>; MOST],
+    pub(super) bodies: [[Option<Body<'a>>; HALF]; 2],
     pub(super) nodes: &'a mut Nodes,
 }
 
@@ -63,130 +87,182 @@ impl Kernel for AdvanceAbreast<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        let (Self { mut bodies, nodes }, isa) = (self, isa.half());
-        let Some((KernelParts { topology, .. }, first)) = &bodies[0] else { return };
-        let (topology, damped) = (*topology, first.damping > 0.0);
-        nodes.resize(topology.present().len() * LANES);
-        gather(isa, &bodies, nodes);
-        let springs: [Option<&Springs>; MOST] = bodies.each_ref().map(|b| b.as_ref().map(|b| &b.1));
-        // Lanes without a body repeat the first.
-        let of = |number: fn(&Springs) -> f32| springs.map(|own| number(own.unwrap_or(first)));
-        let substeps = springs.map(|own| own.map_or(0, |own| own.substeps));
-        if damped {
-            let law = Dashpot { damping: isa.load(&of(|springs| springs.damping)) };
-            let time = isa.load(&of(|springs| springs.time));
-            let step = Step { gravity: splat(isa, [0.0; 3]), time, drifts: false };
-            step.advance(isa, topology, nodes, [law, law], None);
-        }
-        let edges =
-            Elastic { stiffness: isa.load(&of(|springs| springs.stiffness)), one: isa.splat(1.0) };
-        let to_center =
-            Elastic { stiffness: isa.load(&of(|springs| springs.center_stiffness)), ..edges };
-        let gravity = [
-            isa.load(&of(|springs| springs.gravity[0])),
-            isa.load(&of(|springs| springs.gravity[1])),
-            isa.load(&of(|springs| springs.gravity[2])),
-        ];
-        let step = Step { gravity, time: isa.load(&of(Springs::step)), drifts: true };
-        let mut done = substeps[MOST - 1];
-        for _ in 0..done {
-            step.advance(isa, topology, nodes, [edges, to_center], None);
-        }
-        for last in (0..MOST - 1).rev() {
-            let mut moving = [0.0; HALF];
-            moving[..=last].fill(f32::from_bits(u32::MAX));
-            let moving = Some(isa.load(&moving));
-            for _ in done..substeps[last] {
-                step.advance(isa, topology, nodes, [edges, to_center], moving);
+        let (Self { bodies: [mut first, mut second], nodes }, isa) = (self, isa.half());
+        let Some((KernelParts { topology, .. }, springs)) = &first[0] else { return };
+        let (topology, idle) = (*topology, Seat { springs: *springs, left: 0 });
+        nodes.reserve(topology.nodes());
+        let len = topology.present().len() * LANES;
+        let ([now, next], forces) = (nodes.sets.each_mut(), &mut nodes.forces);
+        let (now, next) = (&mut now[..len], &mut next[..len]);
+        let forces = &mut forces[..topology.nodes()];
+        let mut moving = begin(isa, topology, &first, idle, (&mut *now, &mut *forces));
+        let mut later = begin(isa, topology, &second, idle, (&mut *next, &mut *forces));
+        loop {
+            let takes: [bool; HALF] =
+                std::array::from_fn(|lane| moving[lane].left == 0 && later[lane].left > 0);
+            if takes.contains(&true) {
+                exchange(isa, now, next, mask(isa, takes));
+                for lane in (0..HALF).filter(|&lane| takes[lane]) {
+                    moving[lane] = std::mem::replace(&mut later[lane], idle);
+                }
             }
-            done = substeps[last];
+            let left = moving.iter().map(|seat| seat.left).filter(|&left| left > 0);
+            let Some(substeps) = left.min() else { break };
+            advance(isa, topology, &moving, substeps, (&mut *now, &mut *forces));
+            for seat in &mut moving {
+                seat.left = seat.left.saturating_sub(substeps);
+            }
         }
-        scatter(isa, nodes, &mut bodies);
+        // In lanes with two bodies the first one's place is where the second one began.
+        for (first, second) in first.iter_mut().zip(&mut second) {
+            if second.is_some() {
+                std::mem::swap(first, second);
+            }
+        }
+        scatter(isa, now, &mut first);
+        scatter(isa, next, &mut second);
+    }
+}
+
+/// What a lane computes with.
+#[derive(Clone, Copy)]
+struct Seat {
+    springs: Springs,
+    /// Substeps that are left.
+    left: u32,
+}
+
+/// One number of each lane.
+#[inline(always)]
+fn numbers<H: HalfIsa>(isa: H, seats: &[Seat; HALF], number: fn(&Springs) -> f32) -> H::Vector {
+    isa.load(&seats.each_ref().map(|seat| number(&seat.springs)))
+}
+
+/// All bits of the lanes in the set.
+#[inline(always)]
+fn mask<H: HalfIsa>(isa: H, set: [bool; HALF]) -> H::Vector {
+    let bits = set.map(|set| f32::from_bits(if set { u32::MAX } else { 0 }));
+    // A compiler that sees through it makes masked stores of choices, which are slow on some machines.
+    isa.load(black_box(&bits))
+}
+
+/// Brings bodies side by side and lets the dashpots act. A lane without a body is `idle`.
+#[inline(always)]
+fn begin<H: HalfIsa>(
+    isa: H,
+    topology: &Topology,
+    bodies: &[Option<Body<'_>>; HALF],
+    idle: Seat,
+    (nodes, forces): (&mut [Node], &mut [Force]),
+) -> [Seat; HALF] {
+    let seats = bodies.each_ref().map(|body| match body {
+        Some((_, springs)) => Seat { springs: *springs, left: springs.substeps },
+        None => idle,
+    });
+    if bodies.iter().any(Option::is_some) {
+        gather(isa, bodies, nodes);
+        if idle.springs.damping > 0.0 {
+            let law = Dashpot { damping: numbers(isa, &seats, |springs| springs.damping) };
+            let time = numbers(isa, &seats, |springs| springs.time);
+            let step = Step { gravity: [isa.splat(0.0); 3], time, drifts: false };
+            step.advance(isa, topology, nodes, forces, [law, law], None);
+        }
+    }
+    seats
+}
+
+/// Makes some substeps in the lanes where some are left.
+#[inline(always)]
+fn advance<H: HalfIsa>(
+    isa: H,
+    topology: &Topology,
+    seats: &[Seat; HALF],
+    substeps: u32,
+    (nodes, forces): (&mut [Node], &mut [Force]),
+) {
+    let stiffness = numbers(isa, seats, |springs| springs.stiffness);
+    let edges = Elastic { stiffness, one: isa.splat(1.0) };
+    let stiffness = numbers(isa, seats, |springs| springs.center_stiffness);
+    let laws = [edges, Elastic { stiffness, ..edges }];
+    let gravity = [
+        numbers(isa, seats, |springs| springs.gravity[0]),
+        numbers(isa, seats, |springs| springs.gravity[1]),
+        numbers(isa, seats, |springs| springs.gravity[2]),
+    ];
+    let step = Step { gravity, time: numbers(isa, seats, Springs::step), drifts: true };
+    let moving = seats.each_ref().map(|seat| seat.left > 0);
+    if moving == [true; HALF] {
+        for _ in 0..substeps {
+            step.advance(isa, topology, nodes, forces, laws, None);
+        }
+    } else {
+        let moving = mask(isa, moving);
+        for _ in 0..substeps {
+            step.advance(isa, topology, nodes, forces, laws, Some(moving));
+        }
+    }
+}
+
+/// Exchanges the bodies of the lanes in which all bits are set.
+#[inline(always)]
+fn exchange<H: HalfIsa>(isa: H, a: &mut [Node], b: &mut [Node], lanes: H::Vector) {
+    for (a, b) in a.iter_mut().zip(b) {
+        for (a, b) in a.rows().into_iter().zip(b.rows()) {
+            let (old_a, old_b) = (isa.load(a), isa.load(b));
+            isa.store(isa.choose(lanes, old_b, old_a), a);
+            isa.store(isa.choose(lanes, old_a, old_b), b);
+        }
     }
 }
 
 /// Brings the bodies side by side.
 #[inline(always)]
-fn gather<H: HalfIsa>(isa: H, bodies: &[Option<Body<'_>>; MOST], nodes: &mut Nodes) {
-    let Some((first, _)) = &bodies[0] else { return };
-    let mut parts = [first; MOST];
-    for (part, (body, _)) in parts.iter_mut().zip(bodies.iter().flatten()) {
-        *part = body;
-    }
-    let (positions, _) = nodes.positions.as_chunks_mut::<HALF>();
-    let (velocities, _) = nodes.velocities.as_chunks_mut::<HALF>();
-    let (masses, _) = nodes.masses.as_chunks_mut::<HALF>();
-    let (inverse_masses, _) = nodes.inverse_masses.as_chunks_mut::<HALF>();
-    for half in 0..positions.len() {
-        for axis in 0..3 {
+fn gather<H: HalfIsa>(isa: H, bodies: &[Option<Body<'_>>; HALF], nodes: &mut [Node]) {
+    let Some((any, _)) = bodies.iter().flatten().next() else { return };
+    // Lanes without a body repeat one.
+    let bodies = bodies.each_ref().map(|body| body.as_ref().map_or(any, |(body, _)| body));
+    for (half, nodes) in nodes.as_chunks_mut::<HALF>().0.iter_mut().enumerate() {
+        for row in 0..ROWS {
             let mut rows = [isa.splat(0.0); HALF];
-            let mut velocity_rows = rows;
             for lane in 0..HALF {
-                rows[lane] = isa.load(row(&parts[lane].positions.components[axis], half));
-                velocity_rows[lane] = isa.load(row(&parts[lane].velocities.components[axis], half));
+                let KernelParts { positions, velocities, masses, inverse_masses, .. } =
+                    bodies[lane];
+                let values = match row {
+                    0..3 => &positions.components[row],
+                    3..6 => &velocities.components[row - 3],
+                    6 => *masses,
+                    _ => *inverse_masses,
+                };
+                rows[lane] = isa.load(&values[half / 2].as_chunks().0[half % 2]);
             }
             let columns = isa.transpose(rows);
             for lane in 0..HALF {
-                isa.store(columns[lane], &mut positions[half][lane].0[axis]);
+                isa.store(columns[lane], nodes[lane].rows()[row]);
             }
-            let columns = isa.transpose(velocity_rows);
-            for lane in 0..HALF {
-                isa.store(columns[lane], &mut velocities[half][lane].0[axis]);
-            }
-        }
-        let mut rows = [isa.splat(0.0); HALF];
-        let mut inverse_rows = rows;
-        for lane in 0..HALF {
-            rows[lane] = isa.load(row(parts[lane].masses, half));
-            inverse_rows[lane] = isa.load(row(parts[lane].inverse_masses, half));
-        }
-        let columns = isa.transpose(rows);
-        for lane in 0..HALF {
-            isa.store(columns[lane], &mut masses[half][lane].0);
-        }
-        let columns = isa.transpose(inverse_rows);
-        for lane in 0..HALF {
-            isa.store(columns[lane], &mut inverse_masses[half][lane].0);
         }
     }
 }
 
-/// Brings the bodies back.
+/// Brings positions and velocities back.
 #[inline(always)]
-fn scatter<H: HalfIsa>(isa: H, nodes: &Nodes, bodies: &mut [Option<Body<'_>>; MOST]) {
-    let (positions, _) = nodes.positions.as_chunks::<HALF>();
-    let (velocities, _) = nodes.velocities.as_chunks::<HALF>();
-    for half in 0..positions.len() {
+fn scatter<H: HalfIsa>(isa: H, nodes: &[Node], bodies: &mut [Option<Body<'_>>; HALF]) {
+    for (half, nodes) in nodes.as_chunks::<HALF>().0.iter().enumerate() {
         for axis in 0..3 {
-            let mut columns = [isa.splat(0.0); HALF];
-            let mut velocity_columns = columns;
+            let mut columns = [[isa.splat(0.0); HALF]; 2];
             for lane in 0..HALF {
-                columns[lane] = isa.load(&positions[half][lane].0[axis]);
-                velocity_columns[lane] = isa.load(&velocities[half][lane].0[axis]);
+                columns[0][lane] = isa.load(&nodes[lane].position[axis]);
+                columns[1][lane] = isa.load(&nodes[lane].velocity[axis]);
             }
-            let rows = isa.transpose(columns);
-            let velocity_rows = isa.transpose(velocity_columns);
-            for (lane, (body, _)) in bodies.iter_mut().flatten().enumerate() {
-                isa.store(rows[lane], row_mut(&mut body.positions.components[axis], half));
-                isa.store(
-                    velocity_rows[lane],
-                    row_mut(&mut body.velocities.components[axis], half),
-                );
+            let [positions, velocities] = [isa.transpose(columns[0]), isa.transpose(columns[1])];
+            for lane in 0..HALF {
+                let Some((body, _)) = &mut bodies[lane] else { continue };
+                let row = &mut body.positions.components[axis][half / 2];
+                isa.store(positions[lane], &mut row.as_chunks_mut().0[half % 2]);
+                let row = &mut body.velocities.components[axis][half / 2];
+                isa.store(velocities[lane], &mut row.as_chunks_mut().0[half % 2]);
             }
         }
     }
-}
-
-#[inline(always)]
-fn row(lanes: &[Lanes], half: usize) -> &HalfLanes {
-    let (halves, _) = lanes[half / 2].as_chunks();
-    &halves[half % 2]
-}
-
-#[inline(always)]
-fn row_mut(lanes: &mut [Lanes], half: usize) -> &mut HalfLanes {
-    let (halves, _) = lanes[half / 2].as_chunks_mut();
-    &mut halves[half % 2]
 }
 
 /// One step with one kind of force.
@@ -208,28 +284,24 @@ impl<V: Copy> Step<V> {
         self,
         isa: H,
         topology: &Topology,
-        nodes: &mut Nodes,
+        nodes: &mut [Node],
+        forces: &mut [Force],
         [edges, to_center]: [L; 2],
         moving: Option<V>,
     ) {
-        let shared = pull_to_center(isa, topology, nodes, to_center);
-        edge_forces(isa, topology, nodes, edges);
-        let len = topology.nodes();
-        let (positions, velocities) = (&mut nodes.positions[..len], &mut nodes.velocities[..len]);
-        let (masses, inverse_masses) = (&nodes.masses[..len], &nodes.inverse_masses[..len]);
-        let forces = &nodes.forces[..len];
-        for node in 0..len {
-            let force = plus(isa, load(isa, &forces[node].0), shared);
-            let weight = times(isa, self.gravity, isa.load(&masses[node].0));
-            let factor = isa.mul(isa.load(&inverse_masses[node].0), self.time);
-            let change = times(isa, plus(isa, force, weight), factor);
-            let before = load(isa, &velocities[node].0);
-            let velocity = plus(isa, before, change);
-            store(isa, choose(isa, moving, velocity, before), &mut velocities[node].0);
+        let shared = pull_to_center(isa, topology, nodes, forces, to_center);
+        edge_forces(isa, topology, nodes, forces, edges);
+        for (node, Force(force)) in nodes.iter_mut().zip(forces) {
+            let force = plus(isa, load(isa, force), shared);
+            let weight = times(isa, self.gravity, isa.load(&node.mass));
+            let factor = isa.mul(isa.load(&node.inverse_mass), self.time);
+            let before = load(isa, &node.velocity);
+            let velocity = plus(isa, before, times(isa, plus(isa, force, weight), factor));
+            store(isa, choose(isa, moving, velocity, before), &mut node.velocity);
             if self.drifts {
-                let before = load(isa, &positions[node].0);
+                let before = load(isa, &node.position);
                 let position = plus(isa, before, times(isa, velocity, self.time));
-                store(isa, choose(isa, moving, position, before), &mut positions[node].0);
+                store(isa, choose(isa, moving, position, before), &mut node.position);
             }
         }
     }
@@ -252,33 +324,36 @@ fn choose<H: HalfIsa>(
 
 /// Adds the forces of the springs between nodes.
 #[inline(always)]
-fn edge_forces<H: HalfIsa, L: Law<H>>(isa: H, topology: &Topology, nodes: &mut Nodes, law: L) {
-    let len = topology.nodes();
-    let (positions, velocities) = (&nodes.positions[..len], &nodes.velocities[..len]);
-    let forces = &mut nodes.forces[..len];
-    let Some(&Spring { nodes: [first, _], .. }) = topology.springs().first() else { return };
+fn edge_forces<H: HalfIsa, L: Law<H>>(
+    isa: H,
+    topology: &Topology,
+    nodes: &[Node],
+    forces: &mut [Force],
+    law: L,
+) {
     // Springs mostly follow others from the same node: its numbers stay at hand.
-    let mut from = first as usize;
-    let mut force = load(isa, &forces[from].0);
-    let mut own = [load(isa, &positions[from].0), load(isa, &velocities[from].0)];
+    let mut from = 0;
+    let Some(Force(force)) = forces.first() else { return };
+    let mut force = load(isa, force);
+    let mut own = [load(isa, &nodes[from].position), load(isa, &nodes[from].velocity)];
     for Spring { nodes: [a, b], rest } in topology.springs() {
         let (a, b) = (*a as usize, *b as usize);
         if a != from {
             store(isa, force, &mut forces[from].0);
             from = a;
             force = load(isa, &forces[from].0);
-            own = [load(isa, &positions[from].0), load(isa, &velocities[from].0)];
+            own = [load(isa, &nodes[from].position), load(isa, &nodes[from].velocity)];
         }
-        // The way from the second end, because what is subtracted may be in memory, and the same for
-        // the force on it.
-        let way = minus(isa, own[0], load(isa, &positions[b].0));
+        let other = &nodes[b];
+        // The way from the second end, and the force on it: what is subtracted or added may then be
+        // in memory.
+        let way = minus(isa, own[0], load(isa, &other.position));
         let relative =
-            if L::NEEDS_VELOCITY { minus(isa, own[1], load(isa, &velocities[b].0)) } else { way };
-        let pull = law.pull(isa, way, relative, isa.splat(*rest));
-        let pulled = times(isa, way, pull);
+            if L::NEEDS_VELOCITY { minus(isa, own[1], load(isa, &other.velocity)) } else { way };
+        let pulled = times(isa, way, law.pull(isa, way, relative, isa.splat(*rest)));
         force = minus(isa, force, pulled);
-        let other = plus(isa, load(isa, &forces[b].0), pulled);
-        store(isa, other, &mut forces[b].0);
+        let Force(other) = &mut forces[b];
+        store(isa, plus(isa, load(isa, other), pulled), other);
     }
     store(isa, force, &mut forces[from].0);
 }
@@ -289,32 +364,30 @@ fn edge_forces<H: HalfIsa, L: Law<H>>(isa: H, topology: &Topology, nodes: &mut N
 fn pull_to_center<H: HalfIsa, L: Law<H>>(
     isa: H,
     topology: &Topology,
-    nodes: &mut Nodes,
+    nodes: &[Node],
+    forces: &mut [Force],
     law: L,
 ) -> [H::Vector; 3] {
-    let len = topology.nodes();
     let zero = [isa.splat(0.0); 3];
-    let Some(rest) = topology.center_rest() else {
-        nodes.forces[..len].fill(Node::default());
+    let Some(rests) = topology.center_rest() else {
+        forces.fill(Force::default());
         return zero;
     };
-    let (positions, velocities) = (&nodes.positions[..len], &nodes.velocities[..len]);
-    let (forces, rest) = (&mut nodes.forces[..len], &rest[..len]);
-    let share = 1.0 / len as f32;
-    let center = times(isa, sum(isa, positions), isa.splat(share));
-    let center_velocity =
-        if L::NEEDS_VELOCITY { times(isa, sum(isa, velocities), isa.splat(share)) } else { zero };
-    for node in 0..len {
-        let way = minus(isa, center, load(isa, &positions[node].0));
-        let relative = if L::NEEDS_VELOCITY {
-            minus(isa, center_velocity, load(isa, &velocities[node].0))
-        } else {
-            way
-        };
-        let pull = law.pull(isa, way, relative, isa.splat(rest[node]));
-        store(isa, times(isa, way, pull), &mut forces[node].0);
+    let nodes = &nodes[..forces.len()];
+    let share = 1.0 / nodes.len() as f32;
+    let center = sum(isa, nodes, |node| &node.position);
+    let center = times(isa, center, isa.splat(share));
+    let velocity = if L::NEEDS_VELOCITY { sum(isa, nodes, |node| &node.velocity) } else { zero };
+    let velocity = times(isa, velocity, isa.splat(share));
+    for ((node, Force(force)), rest) in nodes.iter().zip(&mut *forces).zip(rests) {
+        let way = minus(isa, center, load(isa, &node.position));
+        let relative =
+            if L::NEEDS_VELOCITY { minus(isa, velocity, load(isa, &node.velocity)) } else { way };
+        let pull = law.pull(isa, way, relative, isa.splat(*rest));
+        store(isa, times(isa, way, pull), force);
     }
-    plus(isa, times(isa, sum(isa, forces), isa.splat(-share)), zero)
+    let total = sum(isa, forces, |force| &force.0);
+    plus(isa, times(isa, total, isa.splat(-share)), zero)
 }
 
 /// The sum over a body's nodes in the order in which a body by itself takes it: over every
@@ -322,11 +395,11 @@ fn pull_to_center<H: HalfIsa, L: Law<H>>(
 ///
 /// [`fold`]: crate::simd::fold
 #[inline(always)]
-fn sum<H: HalfIsa>(isa: H, nodes: &[Node]) -> [H::Vector; 3] {
+fn sum<H: HalfIsa, T>(isa: H, nodes: &[T], of: fn(&T) -> &[HalfLanes; 3]) -> [H::Vector; 3] {
     let zero = [isa.splat(0.0); 3];
     let mut sums = [zero; HALF];
     for lane in 0..HALF {
-        let (low, high) = (every(isa, nodes, lane), every(isa, nodes, lane + HALF));
+        let (low, high) = (every(isa, nodes, lane, of), every(isa, nodes, lane + HALF, of));
         sums[lane] = plus(isa, low, high);
     }
     let mut half = HALF / 2;
@@ -342,13 +415,17 @@ fn sum<H: HalfIsa>(isa: H, nodes: &[Node]) -> [H::Vector; 3] {
 
 /// The sum over every [`LANES`]th node from the first given on.
 #[inline(always)]
-fn every<H: HalfIsa>(isa: H, nodes: &[Node], first: usize) -> [H::Vector; 3] {
-    let Some(node) = nodes.get(first) else { return [isa.splat(0.0); 3] };
-    let mut sum = load(isa, &node.0);
-    let mut next = first + LANES;
-    while let Some(node) = nodes.get(next) {
-        sum = plus(isa, sum, load(isa, &node.0));
-        next += LANES;
+fn every<H: HalfIsa, T>(
+    isa: H,
+    nodes: &[T],
+    first: usize,
+    of: fn(&T) -> &[HalfLanes; 3],
+) -> [H::Vector; 3] {
+    let mut rest = nodes.iter().skip(first).step_by(LANES);
+    let Some(node) = rest.next() else { return [isa.splat(0.0); 3] };
+    let mut sum = load(isa, of(node));
+    for node in rest {
+        sum = plus(isa, sum, load(isa, of(node)));
     }
     sum
 }

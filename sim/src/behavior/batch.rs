@@ -6,12 +6,12 @@ use std::any::Any;
 use std::cmp::Reverse;
 use std::sync::Arc;
 
-use super::abreast::{AdvanceAbreast, MOST};
+use super::abreast::{AdvanceAbreast, MOST, seat};
 use super::spring_kernel::{Advance, Springs};
 use super::{Input, MassSpring, Workspace};
 use crate::geometry::Mesh;
 use crate::object::Object;
-use crate::simd::Simd;
+use crate::simd::{HALF, Simd};
 
 /// The bodies that must move on average for a step side by side to cost less than their steps one by
 /// one; usually 4.
@@ -69,9 +69,13 @@ pub(crate) fn advance(objects: &mut [Object], workspace: &mut Workspace, simd: S
 /// How many of the first bodies are best advanced together.
 fn together(bodies: &[Waiting]) -> usize {
     let most = &bodies[..bodies.len().min(MOST)];
-    let steps = |body: &Waiting| u64::from(body.springs.substeps);
-    let all: u64 = most.iter().map(steps).sum();
-    if all >= WORTH * steps(&bodies[0]) { most.len() } else { 1 }
+    let mut lanes = [0; HALF];
+    for (place, body) in most.iter().enumerate() {
+        let (_, lane) = seat(place);
+        lanes[lane] += u64::from(body.springs.substeps);
+    }
+    let (all, longest) = (lanes.iter().sum::<u64>(), lanes.into_iter().max());
+    if all >= WORTH * longest.unwrap_or(0) { most.len() } else { 1 }
 }
 
 fn advance_together(
@@ -80,15 +84,16 @@ fn advance_together(
     workspace: &mut Workspace,
     simd: Simd,
 ) {
-    let mut lanes = [const { None }; MOST];
+    let mut seated = [const { [const { None }; HALF] }; 2];
     for (place, object) in objects.iter_mut().enumerate() {
-        if let Some(lane) = bodies.iter().position(|body| body.place == place)
+        if let Some(index) = bodies.iter().position(|body| body.place == place)
             && let Some(mesh) = object.geometry.as_mesh_mut()
         {
-            lanes[lane] = Some((mesh.kernel_parts(), bodies[lane].springs));
+            let (turn, lane) = seat(index);
+            seated[turn][lane] = Some((mesh.kernel_parts(), bodies[index].springs));
         }
     }
-    simd.run(AdvanceAbreast { bodies: lanes, nodes: &mut workspace.abreast });
+    simd.run(AdvanceAbreast { bodies: seated, nodes: &mut workspace.abreast });
 }
 
 /// Advances the springs of one body.
