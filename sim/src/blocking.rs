@@ -158,7 +158,7 @@ impl Blocking {
         for &id in members {
             block.objects.extend(self.objects.get_mut(id as usize).and_then(Option::take));
         }
-        block.gathered.reserve(members.len());
+        block.gathered.reserve(&block.objects);
         block.refresh();
     }
 }

@@ -42,7 +42,8 @@ pub struct Stages {
     /// The acceleration of gravity, in metres per second squared.
     pub gravity: Vec3,
     /// How long one object's update may take before the object is quarantined, if there is a limit.
-    /// It is a limit on time as measured, so what it does is not repeatable.
+    /// It is a limit on time as measured, so what it does is not repeatable. To be measured, bodies are
+    /// then updated one by one, which takes longer than together.
     pub callback_budget: Option<Duration>,
     /// The vector instructions by which kernels run; usually the widest. Results are the same.
     pub simd: Simd,
@@ -203,7 +204,7 @@ impl Stages {
         if done.is_err() {
             object.quarantine(Fault { kind: FaultKind::Panicked, frame });
         } else if waits {
-            // See `update`.
+            // Its springs are advanced with those of others, and then it is refreshed.
         } else if began.is_some_and(|(began, budget)| began.elapsed() > budget) {
             object.quarantine(Fault { kind: FaultKind::OverBudget, frame });
         } else if object.quarantined().is_none() {

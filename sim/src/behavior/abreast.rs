@@ -11,7 +11,7 @@ use std::hint::black_box;
 use super::spring_kernel::Springs;
 use super::spring_law::{Dashpot, Elastic, Law, load, minus, plus, store, times};
 use crate::geometry::{KernelParts, LANES, Spring, Topology};
-use crate::simd::{Arithmetic, HALF, HalfIsa, HalfLanes, Isa, Kernel};
+use crate::simd::{HALF, HalfIsa, HalfLanes, Isa, Kernel};
 
 /// The most bodies that share the lanes.
 pub(super) const MOST: usize = 2 * HALF;

@@ -17,6 +17,10 @@ use crate::simd::{HALF, Simd};
 /// one; usually 4.
 const WORTH: u64 = 4;
 
+/// The most nodes of a body that is advanced together with others; usually 1,024, of which sixteen bodies'
+/// just fit a second-level cache of 1 MB.
+const MOST_NODES: usize = 1_024;
+
 /// A body whose springs are left to be advanced.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Waiting {
@@ -34,14 +38,18 @@ impl Waiting {
     }
 }
 
+/// Whether some of so many bodies with so many nodes might be advanced together.
+pub(super) fn is_likely(bodies: usize, nodes: usize) -> bool {
+    bodies as u64 >= WORTH && nodes <= MOST_NODES
+}
+
 /// Begins the update of an object that is a mass–spring body and nothing else: its springs then wait
 /// for [`advance`]. `false`, and nothing has happened, for any other object.
 pub(crate) fn begin(object: &mut Object, place: usize, input: &mut Input<'_>) -> bool {
     let behavior: &dyn Any = &*object.behavior;
     let Some(behavior) = behavior.downcast_ref::<MassSpring>() else { return false };
-    let Some(mesh) = object.geometry.as_mesh_mut().filter(|mesh| mesh.is_whole()) else {
-        return false;
-    };
+    let fits = |mesh: &&mut Mesh| mesh.is_whole() && mesh.topology().nodes() <= MOST_NODES;
+    let Some(mesh) = object.geometry.as_mesh_mut().filter(fits) else { return false };
     let springs = behavior.begin(mesh, input);
     let topology = Arc::as_ptr(mesh.topology()).addr();
     input.workspace.waiting.push(Waiting { place, topology, springs });
@@ -105,5 +113,5 @@ pub(super) fn advance_alone(
 ) {
     let parts = mesh.kernel_parts();
     let chunks = parts.topology.present().len();
-    simd.for_look_up(chunks).run(Advance { parts, workspace, springs });
+    simd.for_look_up(chunks).run(Advance { parts, nodes: &mut workspace.alone, springs });
 }

@@ -15,10 +15,9 @@
 //! [`abreast`]: super::abreast
 //! [`fold`]: crate::simd::fold
 
-use super::Workspace;
 use super::spring_law::{Dashpot, Elastic, Law, load, minus, plus, splat, store, times};
-use crate::geometry::{KernelParts, Lanes, Slot};
-use crate::simd::{Isa, Kernel, Lanes3};
+use crate::geometry::{KernelParts, LANES, Lanes, Slot};
+use crate::simd::{Isa, Kernel, Lanes3, Quad};
 
 /// What one frame of a mass–spring body is computed from, besides its mesh.
 #[derive(Clone, Copy, Debug)]
@@ -44,10 +43,38 @@ impl Springs {
     }
 }
 
+/// Memory for a body's nodes.
+#[derive(Debug, Default)]
+pub(super) struct Nodes {
+    /// In metres.
+    positions: Vec<Lanes3>,
+    /// In metres per second.
+    velocities: Vec<Lanes3>,
+    /// What the springs to the centre pull at each, in newtons.
+    pulled: Vec<Lanes3>,
+    /// Where positions and velocities are looked up.
+    tables: [Vec<Quad>; 2],
+}
+
+impl Nodes {
+    /// Makes room for a body of so many nodes.
+    pub(super) fn reserve(&mut self, nodes: usize) {
+        let chunks = nodes.div_ceil(LANES);
+        for vectors in [&mut self.positions, &mut self.velocities, &mut self.pulled] {
+            vectors.clear();
+            vectors.reserve(chunks);
+        }
+        for table in &mut self.tables {
+            table.clear();
+            table.reserve(chunks * LANES);
+        }
+    }
+}
+
 /// One frame of a mass–spring body.
 pub(super) struct Advance<'a> {
     pub(super) parts: KernelParts<'a>,
-    pub(super) workspace: &'a mut Workspace,
+    pub(super) nodes: &'a mut Nodes,
     pub(super) springs: Springs,
 }
 
@@ -56,25 +83,25 @@ impl Kernel for Advance<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        let Self { parts, workspace, springs } = self;
+        let Self { parts, nodes, springs } = self;
         let chunks = parts.topology.present().len();
-        gather(&mut workspace.positions, &parts.positions.components, chunks);
-        gather(&mut workspace.velocities, &parts.velocities.components, chunks);
-        workspace.pulled.clear();
-        workspace.pulled.resize(chunks, Lanes3::default());
+        gather(&mut nodes.positions, &parts.positions.components, chunks);
+        gather(&mut nodes.velocities, &parts.velocities.components, chunks);
+        nodes.pulled.clear();
+        nodes.pulled.resize(chunks, Lanes3::default());
         if springs.damping > 0.0 {
             let law = Dashpot { damping: isa.splat(springs.damping) };
             let whole = Step { gravity: [0.0; 3], time: springs.time, drifts: false };
-            whole.advance(isa, &parts, workspace, law, law);
+            whole.advance(isa, &parts, nodes, law, law);
         }
         let edges = Elastic { stiffness: isa.splat(springs.stiffness), one: isa.splat(1.0) };
         let to_center = Elastic { stiffness: isa.splat(springs.center_stiffness), ..edges };
         let step = Step { gravity: springs.gravity, time: springs.step(), drifts: true };
         for _ in 0..springs.substeps {
-            step.advance(isa, &parts, workspace, edges, to_center);
+            step.advance(isa, &parts, nodes, edges, to_center);
         }
-        scatter(&workspace.positions, &mut parts.positions.components);
-        scatter(&workspace.velocities, &mut parts.velocities.components);
+        scatter(&nodes.positions, &mut parts.positions.components);
+        scatter(&nodes.velocities, &mut parts.velocities.components);
     }
 }
 
@@ -114,12 +141,12 @@ impl Step {
         self,
         isa: I,
         parts: &KernelParts<'_>,
-        workspace: &mut Workspace,
+        nodes: &mut Nodes,
         edges: L,
         to_center: L,
     ) {
-        let shared = splat(isa, pull_to_center(isa, parts, workspace, to_center));
-        let Workspace { positions, velocities, pulled, tables, .. } = workspace;
+        let shared = splat(isa, pull_to_center(isa, parts, nodes, to_center));
+        let Nodes { positions, velocities, pulled, tables } = nodes;
         let [of_positions, of_velocities] = tables;
         let chunks = positions.len();
         let (velocities, pulled) = (&mut velocities[..chunks], &pulled[..chunks]);
@@ -185,17 +212,17 @@ unsafe fn edge_forces<I: Isa, L: Law<I>>(
     force
 }
 
-/// Leaves what the springs to the centre pull at each node in the workspace, and returns the force on
+/// Leaves what the springs to the centre pull at each node among the nodes, and returns the force on
 /// all nodes alike: their share of what is pulled at the centre. All in newtons.
 #[inline(always)]
 fn pull_to_center<I: Isa, L: Law<I>>(
     isa: I,
     parts: &KernelParts<'_>,
-    workspace: &mut Workspace,
+    nodes: &mut Nodes,
     law: L,
 ) -> [f32; 3] {
     let Some(rest) = parts.topology.center_lanes() else { return [0.0; 3] };
-    let Workspace { positions, velocities, pulled, .. } = workspace;
+    let Nodes { positions, velocities, pulled, .. } = nodes;
     let chunks = positions.len();
     let (velocities, pulled) = (&velocities[..chunks], &mut pulled[..chunks]);
     let (rest, present) = (&rest[..chunks], &parts.topology.present()[..chunks]);

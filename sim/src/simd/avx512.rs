@@ -7,7 +7,7 @@ use super::avx2::{Avx2, Avx2Half};
 use super::{Arithmetic, Isa, Kernel, LaneSet, Lanes3, Quad};
 use crate::geometry::{LANES, Lanes};
 
-/// The proof that the machine has AVX-512F. There is none without.
+/// The proof that the machine has AVX-512F and AVX-512VL. There is none without.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Avx512(Avx2);
 
@@ -26,7 +26,7 @@ impl Avx512 {
     }
 
     pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        // SAFETY: the machine has AVX-512F, or there were no `self`.
+        // SAFETY: the machine has AVX-512F and VL, or there were no `self`.
         unsafe { with_avx512(self, kernel) }
     }
 }
@@ -42,7 +42,7 @@ impl Arithmetic for Avx512 {
 
     #[inline(always)]
     fn splat(self, value: f32) -> __m512 {
-        // SAFETY: the machine has AVX-512F, or there were no `self`.
+        // SAFETY: the machine has AVX-512F and VL, or there were no `self`.
         unsafe { _mm512_set1_ps(value) }
     }
 

@@ -27,7 +27,7 @@ pub enum Instructions {
     Scalar,
     /// AVX2, on x86-64.
     Avx2,
-    /// AVX-512F, on x86-64.
+    /// AVX-512F and AVX-512VL, on x86-64.
     Avx512,
 }
 
