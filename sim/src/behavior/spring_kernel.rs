@@ -10,7 +10,7 @@
 //!    the order in which the topology lists them, plus 2., plus mass · gravity.
 //! 4. Its velocity changes by force · (inverse mass · time), then its position by velocity · time.
 //!
-//! Both ends of a spring compute its pull: gathering is cheaper than scattering, and needs no order.
+//! Here both ends of a spring compute its pull: within a body gathering is cheaper than scattering, and needs no order.
 //!
 //! [`abreast`]: super::abreast
 //! [`fold`]: crate::simd::fold
@@ -38,7 +38,7 @@ pub(crate) struct Springs {
 
 impl Springs {
     /// The time of a substep, in seconds.
-    pub(super) fn step(&self) -> f32 {
+    pub(super) fn step_time(&self) -> f32 {
         self.time / self.substeps as f32
     }
 }
@@ -96,7 +96,7 @@ impl Kernel for Advance<'_> {
         }
         let edges = Elastic { stiffness: isa.splat(springs.stiffness), one: isa.splat(1.0) };
         let to_center = Elastic { stiffness: isa.splat(springs.center_stiffness), ..edges };
-        let step = Step { gravity: springs.gravity, time: springs.step(), drifts: true };
+        let step = Step { gravity: springs.gravity, time: springs.step_time(), drifts: true };
         for _ in 0..springs.substeps {
             step.advance(isa, &parts, nodes, edges, to_center);
         }

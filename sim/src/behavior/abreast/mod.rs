@@ -6,12 +6,17 @@
 //!
 //! [`spring_kernel`]: super::spring_kernel
 
+mod nodes;
+
 use std::hint::black_box;
 
+use self::nodes::{Body, Force, Node, exchange, gather, scatter};
 use super::spring_kernel::Springs;
 use super::spring_law::{Dashpot, Elastic, Law, load, minus, plus, store, times};
 use crate::geometry::{KernelParts, LANES, Spring, Topology};
 use crate::simd::{HALF, HalfIsa, HalfLanes, Isa, Kernel};
+
+pub(super) use self::nodes::Nodes;
 
 /// The most bodies that share the lanes.
 pub(super) const MOST: usize = 2 * HALF;
@@ -21,58 +26,6 @@ pub(super) const MOST: usize = 2 * HALF;
 pub(super) fn seat(place: usize) -> (usize, usize) {
     if place < HALF { (0, place) } else { (1, MOST - 1 - place) }
 }
-
-/// One node of each body, where loads and stores are fastest.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(align(64))]
-struct Node {
-    /// In metres.
-    position: [HalfLanes; 3],
-    /// In metres per second.
-    velocity: [HalfLanes; 3],
-    /// In kilograms.
-    mass: HalfLanes,
-    /// In 1/kg.
-    inverse_mass: HalfLanes,
-}
-
-impl Node {
-    #[inline(always)]
-    fn rows(&mut self) -> [&mut HalfLanes; ROWS] {
-        let ([x, y, z], [vx, vy, vz]) = (&mut self.position, &mut self.velocity);
-        [x, y, z, vx, vy, vz, &mut self.mass, &mut self.inverse_mass]
-    }
-}
-
-/// The numbers of a node.
-const ROWS: usize = 8;
-
-/// The force on one node of each body, in newtons.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(align(32))]
-struct Force([HalfLanes; 3]);
-
-/// Memory for the bodies' nodes.
-#[derive(Debug, Default)]
-pub(super) struct Nodes {
-    /// The bodies under way, and those which wait for a lane or are done; in whole [`LANES`] of nodes.
-    sets: [Vec<Node>; 2],
-    forces: Vec<Force>,
-}
-
-impl Nodes {
-    /// Makes room for bodies of so many nodes.
-    pub(super) fn reserve(&mut self, nodes: usize) {
-        let room = nodes.next_multiple_of(LANES);
-        for set in &mut self.sets {
-            set.resize(set.len().max(room), Node::default());
-        }
-        self.forces.resize(self.forces.len().max(room), Force::default());
-    }
-}
-
-/// A body with its numbers.
-pub(super) type Body<'a> = (KernelParts<'a>, Springs);
 
 /// One frame of some bodies: those first in the lanes and those second. The first lane has a body, and
 /// no lane has a second one without a first. All share their topology, whose number of nodes all their
@@ -189,7 +142,7 @@ fn advance<H: HalfIsa>(
         numbers(isa, seats, |springs| springs.gravity[1]),
         numbers(isa, seats, |springs| springs.gravity[2]),
     ];
-    let step = Step { gravity, time: numbers(isa, seats, Springs::step), drifts: true };
+    let step = Step { gravity, time: numbers(isa, seats, Springs::step_time), drifts: true };
     let moving = seats.each_ref().map(|seat| seat.left > 0);
     if moving == [true; HALF] {
         for _ in 0..substeps {
@@ -199,68 +152,6 @@ fn advance<H: HalfIsa>(
         let moving = mask(isa, moving);
         for _ in 0..substeps {
             step.advance(isa, topology, nodes, forces, laws, Some(moving));
-        }
-    }
-}
-
-/// Exchanges the bodies of the lanes in which all bits are set.
-#[inline(always)]
-fn exchange<H: HalfIsa>(isa: H, a: &mut [Node], b: &mut [Node], lanes: H::Vector) {
-    for (a, b) in a.iter_mut().zip(b) {
-        for (a, b) in a.rows().into_iter().zip(b.rows()) {
-            let (old_a, old_b) = (isa.load(a), isa.load(b));
-            isa.store(isa.choose(lanes, old_b, old_a), a);
-            isa.store(isa.choose(lanes, old_a, old_b), b);
-        }
-    }
-}
-
-/// Brings the bodies side by side.
-#[inline(always)]
-fn gather<H: HalfIsa>(isa: H, bodies: &[Option<Body<'_>>; HALF], nodes: &mut [Node]) {
-    let Some((any, _)) = bodies.iter().flatten().next() else { return };
-    // Lanes without a body repeat one.
-    let bodies = bodies.each_ref().map(|body| body.as_ref().map_or(any, |(body, _)| body));
-    for (half, nodes) in nodes.as_chunks_mut::<HALF>().0.iter_mut().enumerate() {
-        for row in 0..ROWS {
-            let mut rows = [isa.splat(0.0); HALF];
-            for lane in 0..HALF {
-                let KernelParts { positions, velocities, masses, inverse_masses, .. } =
-                    bodies[lane];
-                let values = match row {
-                    0..3 => &positions.components[row],
-                    3..6 => &velocities.components[row - 3],
-                    6 => *masses,
-                    _ => *inverse_masses,
-                };
-                rows[lane] = isa.load(&values[half / 2].as_chunks().0[half % 2]);
-            }
-            let columns = isa.transpose(rows);
-            for lane in 0..HALF {
-                isa.store(columns[lane], nodes[lane].rows()[row]);
-            }
-        }
-    }
-}
-
-/// Brings positions and velocities back.
-#[inline(always)]
-fn scatter<H: HalfIsa>(isa: H, nodes: &[Node], bodies: &mut [Option<Body<'_>>; HALF]) {
-    for (half, nodes) in nodes.as_chunks::<HALF>().0.iter().enumerate() {
-        for axis in 0..3 {
-            let mut columns = [[isa.splat(0.0); HALF]; 2];
-            for lane in 0..HALF {
-                columns[0][lane] = isa.load(&nodes[lane].position[axis]);
-                columns[1][lane] = isa.load(&nodes[lane].velocity[axis]);
-            }
-            let [positions, velocities] = [isa.transpose(columns[0]), isa.transpose(columns[1])];
-            for lane in 0..HALF {
-                let Some((body, _)) = &mut bodies[lane] else { continue };
-                let row = &mut body.positions.components[axis][half / 2];
-                isa.store(positions[lane], &mut row.as_chunks_mut().0[half % 2]);
-                let row = &mut body.velocities.components[axis][half / 2];
-                isa.store(velocities[lane], &mut row.as_chunks_mut().0[half % 2]);
-            }
         }
     }
 }
