@@ -1,8 +1,9 @@
 //! Springs per nanosecond of the update kernel, for every set of vector instructions that the machine
 //! has, beside a ceiling: the same arithmetic with lanes across sixteen bodies, without an engine.
 //!
-//! The kernel is seen in three uses: a block of bodies that all make many substeps, a block of bodies
-//! that make 1 to 10 as the particles do, dashpots, boxes and checks included, and one body alone.
+//! The kernel is seen in three uses: a block of bodies that all make many substeps, one after the other
+//! many blocks of bodies that make 1 to 10 as the particles do, dashpots, boxes and checks included, and
+//! one body alone.
 //!
 //! `cargo bench -p dualframe-sim --bench kernels`
 
@@ -26,8 +27,8 @@ use glam::Vec3;
 const BODIES: usize = 16;
 /// So many that the rest of an update (boxes, checks) does not show.
 const SUBSTEPS: u32 = 100;
-/// Frames of bodies that make few substeps; about as much work.
-const FRAMES: u64 = 18;
+/// Blocks of bodies that make few substeps; about as much work.
+const BLOCKS: usize = 18;
 /// In newton seconds per metre.
 const DAMPING: f32 = 0.02;
 /// In newtons per metre.
@@ -51,7 +52,7 @@ fn positions() -> Vec<Vec3> {
 enum Use {
     /// A block whose bodies all make [`SUBSTEPS`] in one frame.
     Equal,
-    /// A block whose bodies make 1 to 10 a frame, and are damped.
+    /// [`BLOCKS`] whose bodies make 1 to 10 a frame, and are damped.
     Mixed,
     /// One body that makes [`SUBSTEPS`] in one frame.
     Alone,
@@ -72,8 +73,8 @@ impl Use {
         if self == Self::Alone { 1 } else { BODIES }
     }
 
-    fn frames(self) -> u64 {
-        if self == Self::Mixed { FRAMES } else { 1 }
+    fn blocks(self) -> usize {
+        if self == Self::Mixed { BLOCKS } else { 1 }
     }
 
     fn damping(self) -> f32 {
@@ -89,7 +90,7 @@ impl Use {
     fn work(self) -> u64 {
         let dashpots = u32::from(self.damping() > 0.0);
         let steps = (0..self.bodies()).map(|index| self.substeps(index) + dashpots);
-        steps.map(u64::from).sum::<u64>() * self.frames()
+        steps.map(u64::from).sum::<u64>() * self.blocks() as u64
     }
 }
 
@@ -124,7 +125,8 @@ fn entrants(topology: &Arc<Topology>) -> Vec<Entrant> {
         let work = BODIES as u64 * u64::from(SUBSTEPS);
         entrants.push(Entrant { simd, case: None, advance, work, nanoseconds: Vec::new() });
         for case in Use::ALL {
-            let mut block = block(topology, case);
+            let mut blocks: Vec<Block> =
+                (0..case.blocks()).map(|_| block(topology, case)).collect();
             let stages = Stages {
                 rules: Rules::new(),
                 time_step: STEP * block_substeps(case) as f32,
@@ -133,9 +135,8 @@ fn entrants(topology: &Arc<Topology>) -> Vec<Entrant> {
                 simd,
             };
             let advance = Box::new(move || {
-                for frame in 0..case.frames() {
-                    let block = black_box(&mut block);
-                    stages.update(frame, block, std::iter::empty(), &mut |_, _, _| {});
+                for block in black_box(&mut blocks) {
+                    stages.update(0, block, std::iter::empty(), &mut |_, _, _| {});
                 }
             });
             let (case, work) = (Some(case), case.work());
