@@ -3,10 +3,11 @@
 //! How many bodies are side by side, and which, never shows in the results.
 
 use std::any::Any;
+use std::cell::RefCell;
 use std::cmp::Reverse;
 use std::sync::Arc;
 
-use super::abreast::{AdvanceAbreast, MOST, seat};
+use super::abreast::{AdvanceAbreast, MOST, Nodes, seat};
 use super::spring_kernel::{Advance, Springs};
 use super::{Input, MassSpring, Workspace};
 use crate::geometry::Mesh;
@@ -17,9 +18,14 @@ use crate::simd::{HALF, Simd};
 /// one; usually 4.
 const WORTH: u64 = 4;
 
-/// The most nodes of a body that is advanced together with others; usually 1,024, of which sixteen bodies'
-/// just fit a second-level cache of 1 MB.
+/// The most nodes of a body that is advanced together with others; usually 1,024, with which sixteen
+/// bodies fit a second-level cache of 1 MB.
 const MOST_NODES: usize = 1_024;
+
+thread_local! {
+    /// A thread's, not a block's, so that it is still in the first-level cache at the next block.
+    static NODES: RefCell<Nodes> = RefCell::default();
+}
 
 /// A body whose springs are left to be advanced.
 #[derive(Clone, Copy, Debug)]
@@ -36,11 +42,6 @@ impl Waiting {
     fn kind(&self) -> (usize, bool) {
         (self.topology, self.springs.damping > 0.0)
     }
-}
-
-/// Whether some of so many bodies with so many nodes might be advanced together.
-pub(super) fn is_likely(bodies: usize, nodes: usize) -> bool {
-    bodies as u64 >= WORTH && nodes <= MOST_NODES
 }
 
 /// Begins the update of an object that is a mass–spring body and nothing else: its springs then wait
@@ -64,7 +65,7 @@ pub(crate) fn advance(objects: &mut [Object], workspace: &mut Workspace, simd: S
         while let [first, ..] = alike {
             let (now, later) = alike.split_at(together(alike));
             if now.len() > 1 {
-                advance_together(now, objects, workspace, simd);
+                advance_together(now, objects, simd);
             } else if let Some(mesh) = objects[first.place].geometry.as_mesh_mut() {
                 advance_alone(mesh, first.springs, workspace, simd);
             }
@@ -86,12 +87,7 @@ fn together(bodies: &[Waiting]) -> usize {
     if all >= WORTH * longest.unwrap_or(0) { most.len() } else { 1 }
 }
 
-fn advance_together(
-    bodies: &[Waiting],
-    objects: &mut [Object],
-    workspace: &mut Workspace,
-    simd: Simd,
-) {
+fn advance_together(bodies: &[Waiting], objects: &mut [Object], simd: Simd) {
     let mut seated = [const { [const { None }; HALF] }; 2];
     for (place, object) in objects.iter_mut().enumerate() {
         if let Some(index) = bodies.iter().position(|body| body.place == place)
@@ -101,7 +97,7 @@ fn advance_together(
             seated[turn][lane] = Some((mesh.kernel_parts(), bodies[index].springs));
         }
     }
-    simd.run(AdvanceAbreast { bodies: seated, nodes: &mut workspace.abreast });
+    NODES.with_borrow_mut(|nodes| simd.run(AdvanceAbreast { bodies: seated, nodes }));
 }
 
 /// Advances the springs of one body.

@@ -83,7 +83,6 @@ pub(crate) struct Segment {
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
     alone: spring_kernel::Nodes,
-    abreast: abreast::Nodes,
     /// Bodies whose springs are left to be advanced.
     pub(crate) waiting: Vec<batch::Waiting>,
 }
@@ -95,8 +94,5 @@ impl Workspace {
         let meshes = objects.iter().filter_map(|object| object.geometry.as_mesh());
         let Some(nodes) = meshes.map(|mesh| mesh.topology().nodes()).max() else { return };
         self.alone.reserve(nodes);
-        if batch::is_likely(objects.len(), nodes) {
-            self.abreast.reserve(nodes);
-        }
     }
 }
