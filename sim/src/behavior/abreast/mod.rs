@@ -289,9 +289,9 @@ fn pull_to_center<H: HalfIsa, L: Law<H>>(
 fn sum<H: HalfIsa, T>(isa: H, nodes: &[T], of: fn(&T) -> &[HalfLanes; 3]) -> [H::Vector; 3] {
     let zero = [isa.splat(0.0); 3];
     let mut sums = [zero; HALF];
-    for lane in 0..HALF {
+    for (lane, sum) in sums.iter_mut().enumerate() {
         let (low, high) = (every(isa, nodes, lane, of), every(isa, nodes, lane + HALF, of));
-        sums[lane] = plus(isa, low, high);
+        *sum = plus(isa, low, high);
     }
     let mut half = HALF / 2;
     while half > 0 {
