@@ -1,6 +1,10 @@
 //! Springs per nanosecond of the update kernel, for every set of vector instructions that the machine
 //! has, beside a ceiling: the same arithmetic with lanes across sixteen bodies, without an engine.
 //!
+//! The kernel is seen in three uses: a block of bodies that all make many substeps, one after the other
+//! many blocks of bodies that make 1 to 10 as the particles do, dashpots, boxes and checks included, and
+//! one body alone.
+//!
 //! `cargo bench -p dualframe-sim --bench kernels`
 
 mod ceiling;
@@ -23,6 +27,12 @@ use glam::Vec3;
 const BODIES: usize = 16;
 /// So many that the rest of an update (boxes, checks) does not show.
 const SUBSTEPS: u32 = 100;
+/// Blocks of bodies that make few substeps: as many as 300 particles fill.
+const BLOCKS: usize = 19;
+/// Frames of them, of which all but the first find them in a cache, as in a scene.
+const FRAMES: u64 = 4;
+/// In newton seconds per metre.
+const DAMPING: f32 = 0.02;
 /// In newtons per metre.
 const STIFFNESS: f32 = 60.0;
 /// The time of a substep, in seconds.
@@ -39,55 +49,114 @@ fn positions() -> Vec<Vec3> {
     icosphere(0.1).0.into_iter().map(|node| node * Vec3::new(1.05, 1.0, 0.97)).collect()
 }
 
-fn block(topology: &Arc<Topology>) -> Block {
+/// A way to use the kernel.
+#[derive(Clone, Copy, PartialEq)]
+enum Use {
+    /// A block whose bodies all make [`SUBSTEPS`] in one frame.
+    Equal,
+    /// [`BLOCKS`] whose bodies make 1 to 10 a frame, and are damped.
+    Mixed,
+    /// One body that makes [`SUBSTEPS`] in one frame.
+    Alone,
+}
+
+impl Use {
+    const ALL: [Self; 3] = [Self::Equal, Self::Mixed, Self::Alone];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Equal => "equal",
+            Self::Mixed => "mixed",
+            Self::Alone => "alone",
+        }
+    }
+
+    fn bodies(self) -> usize {
+        if self == Self::Alone { 1 } else { BODIES }
+    }
+
+    fn blocks(self) -> usize {
+        if self == Self::Mixed { BLOCKS } else { 1 }
+    }
+
+    fn frames(self) -> u64 {
+        if self == Self::Mixed { FRAMES } else { 1 }
+    }
+
+    fn damping(self) -> f32 {
+        if self == Self::Mixed { DAMPING } else { 0.0 }
+    }
+
+    /// Of the body number `index`.
+    fn substeps(self, index: usize) -> u32 {
+        if self == Self::Mixed { 1 + (index as u32 * 7) % 10 } else { SUBSTEPS }
+    }
+
+    /// Springs and dashpots computed for each spring of a body.
+    fn work(self) -> u64 {
+        let dashpots = u32::from(self.damping() > 0.0);
+        let steps = (0..self.bodies()).map(|index| self.substeps(index) + dashpots);
+        steps.map(u64::from).sum::<u64>() * self.blocks() as u64 * self.frames()
+    }
+}
+
+fn block(topology: &Arc<Topology>, case: Use) -> Block {
     let object = |index| {
         let masses = [0.01; ICOSPHERE_NODES];
         let mesh = Mesh::new(Arc::clone(topology), &positions(), &masses, 0.03);
-        let springs = MassSpring::new(STIFFNESS, 0.0, SUBSTEPS).expect("a stiffness");
+        let springs = MassSpring::new(STIFFNESS, case.damping(), case.substeps(index));
         let geometry = Geometry::Mesh(mesh.expect("an icosphere"));
-        Object::new(ObjectId(index as u32), Group(0), geometry, springs)
+        Object::new(ObjectId(index as u32), Group(0), geometry, springs.expect("a stiffness"))
     };
-    Block::new((0..BODIES).map(object).collect())
+    Block::new((0..case.bodies()).map(object).collect())
 }
 
-/// Something that integrates [`SUBSTEPS`] of [`BODIES`] bodies.
+/// Something that integrates bodies.
 struct Entrant {
-    name: &'static str,
+    simd: Simd,
+    /// `None` for the ceiling.
+    case: Option<Use>,
     advance: Box<dyn FnMut()>,
-    /// The ceiling it is measured against, by its place.
-    ceiling: Option<usize>,
+    /// Springs and dashpots computed for each spring of a body.
+    work: u64,
     nanoseconds: Vec<f64>,
 }
 
+/// For each set of instructions the ceiling, then the uses.
 fn entrants(topology: &Arc<Topology>) -> Vec<Entrant> {
     let mut entrants: Vec<Entrant> = Vec::new();
     for simd in Simd::available() {
-        let name = simd.instructions().name();
         let mut ceiling = Ceiling::new(topology, &positions(), STIFFNESS, STEP, SUBSTEPS);
-        entrants.push(Entrant {
-            name,
-            advance: Box::new(move || ceiling.advance(simd.instructions())),
-            ceiling: None,
-            nanoseconds: Vec::new(),
-        });
-        let stages = Stages {
-            rules: Rules::new(),
-            time_step: STEP * SUBSTEPS as f32,
-            gravity: Vec3::ZERO,
-            callback_budget: None,
-            simd,
-        };
-        let mut block = block(topology);
-        entrants.push(Entrant {
-            name,
-            advance: Box::new(move || {
-                stages.update(0, black_box(&mut block), std::iter::empty(), &mut |_, _, _| {});
-            }),
-            ceiling: Some(entrants.len() - 1),
-            nanoseconds: Vec::new(),
-        });
+        let advance = Box::new(move || ceiling.advance(simd.instructions()));
+        let work = BODIES as u64 * u64::from(SUBSTEPS);
+        entrants.push(Entrant { simd, case: None, advance, work, nanoseconds: Vec::new() });
+        for case in Use::ALL {
+            let mut blocks: Vec<Block> =
+                (0..case.blocks()).map(|_| block(topology, case)).collect();
+            let stages = Stages {
+                rules: Rules::new(),
+                time_step: STEP * block_substeps(case) as f32,
+                gravity: Vec3::ZERO,
+                callback_budget: None,
+                simd,
+            };
+            let advance = Box::new(move || {
+                for frame in 0..case.frames() {
+                    for block in black_box(&mut blocks) {
+                        stages.update(frame, block, std::iter::empty(), &mut |_, _, _| {});
+                    }
+                }
+            });
+            let (case, work) = (Some(case), case.work());
+            entrants.push(Entrant { simd, case, advance, work, nanoseconds: Vec::new() });
+        }
     }
     entrants
+}
+
+/// The most substeps of a body.
+fn block_substeps(case: Use) -> u32 {
+    (0..case.bodies()).map(|index| case.substeps(index)).max().unwrap_or(1)
 }
 
 fn median(values: &[f64]) -> f64 {
@@ -108,18 +177,25 @@ fn main() {
             entrant.nanoseconds.push(start.elapsed().as_nanos() as f64);
         }
     }
-    let springs = (topology.spring_count() * BODIES) as f64 * f64::from(SUBSTEPS);
-    println!("instructions  springs/ns  ceiling  ratio (medians of {rounds} interleaved rounds)");
-    for entrant in &entrants {
-        let Some(ceiling) = entrant.ceiling.map(|place| &entrants[place]) else { continue };
-        let ratios = entrant.nanoseconds.iter().zip(&ceiling.nanoseconds);
-        let ratios: Vec<f64> = ratios.map(|(own, ceiling)| ceiling / own).collect();
-        println!(
-            "{:12}  {:10.2}  {:7.2}  {:5.2}",
-            entrant.name,
-            springs / median(&entrant.nanoseconds),
-            springs / median(&ceiling.nanoseconds),
-            median(&ratios)
-        );
+    let springs = topology.spring_count() as f64;
+    println!(
+        "instructions  use    springs/ns  ceiling  ratio (medians of {rounds} interleaved rounds)"
+    );
+    for entrants in entrants.chunk_by(|a, b| a.simd == b.simd) {
+        let Some((ceiling, uses)) = entrants.split_first() else { continue };
+        let speed =
+            |entrant: &Entrant, nanoseconds: f64| springs * entrant.work as f64 / nanoseconds;
+        for entrant in uses {
+            let both = entrant.nanoseconds.iter().zip(&ceiling.nanoseconds);
+            let ratios = both.map(|(&own, &its)| speed(entrant, own) / speed(ceiling, its));
+            println!(
+                "{:12}  {:5}  {:10.2}  {:7.2}  {:5.2}",
+                entrant.simd.instructions().name(),
+                entrant.case.map_or("", Use::name),
+                speed(entrant, median(&entrant.nanoseconds)),
+                speed(ceiling, median(&ceiling.nanoseconds)),
+                median(&ratios.collect::<Vec<_>>())
+            );
+        }
     }
 }

@@ -88,10 +88,11 @@ pub(crate) struct Gathered {
 }
 
 impl Gathered {
-    /// Makes room for what so many objects usually have.
-    pub(crate) fn reserve(&mut self, objects: usize) {
-        self.records.reserve(objects * CONTACTS_PER_OBJECT);
-        self.segments.reserve(objects * TOUCHED_PER_OBJECT);
+    /// Makes room for what these objects usually have.
+    pub(crate) fn reserve(&mut self, objects: &[Object]) {
+        self.records.reserve(objects.len() * CONTACTS_PER_OBJECT);
+        self.segments.reserve(objects.len() * TOUCHED_PER_OBJECT);
+        self.workspace.reserve(objects);
     }
 
     pub(crate) fn clear(&mut self) {

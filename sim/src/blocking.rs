@@ -208,7 +208,7 @@ impl Blocking {
         for &id in ids {
             block.objects.extend(self.objects.get_mut(id as usize).and_then(Option::take));
         }
-        block.gathered.reserve(ids.len());
+        block.gathered.reserve(&block.objects);
         block.refresh();
     }
 }

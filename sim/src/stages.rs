@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use glam::Vec3;
 
-use crate::behavior::{Input, Segment, Workspace};
+use crate::behavior::{Input, Segment, Workspace, batch};
 use crate::block::{Block, Gathered};
 use crate::interaction::{Contact, ContactSink, Rules, Scratch, TableFull};
 use crate::message::Message;
@@ -17,8 +17,7 @@ use crate::object::{Drawing, Fault, FaultKind, Object, ObjectId};
 use crate::render::Renderer;
 use crate::simd::Simd;
 
-/// Of so many frames the updates of one are timed, for who balances them; usually 16: reading the
-/// system's clock for every object takes up to a tenth of its update.
+/// Of so many frames the updates of one are timed, for who balances them; usually 16.
 const FRAMES_PER_TIMING: u64 = 16;
 
 /// What the interaction stage counted. Independent of blocking and executor.
@@ -46,7 +45,8 @@ pub struct Stages {
     /// The acceleration of gravity, in metres per second squared.
     pub gravity: Vec3,
     /// How long one object's update may take before the object is quarantined, if there is a limit.
-    /// It is a limit on time as measured, so what it does is not repeatable.
+    /// It is a limit on time as measured, so what it does is not repeatable. To be measured, bodies are
+    /// then updated one by one, which takes longer than together.
     pub callback_budget: Option<Duration>,
     /// The vector instructions by which kernels run; usually the widest. Results are the same.
     pub simd: Simd,
@@ -142,10 +142,11 @@ impl Stages {
         mail: impl Iterator<Item = (ObjectId, ObjectId, &'m Message)> + Clone,
         post: &mut dyn FnMut(ObjectId, ObjectId, Message),
     ) {
+        let began = frame.is_multiple_of(FRAMES_PER_TIMING).then(Instant::now);
         let Gathered { records, segments, workspace } = &mut block.gathered;
         segments.sort_unstable_by_key(|segment| (segment.object, segment.other));
         let mut rest = segments.as_slice();
-        for object in &mut block.objects {
+        for (place, object) in block.objects.iter_mut().enumerate() {
             let own = rest.partition_point(|segment| segment.object <= object.id());
             let (segments, others) = rest.split_at(own);
             rest = others;
@@ -160,11 +161,20 @@ impl Stages {
             let id = object.id();
             let own_mail =
                 mail.clone().filter(move |&(to, ..)| to == id).map(|(.., message)| message);
-            let given = Given { frame, segments, records, workspace: &mut *workspace };
+            let given = Given { frame, place, segments, records, workspace: &mut *workspace };
             self.update_object(object, given, own_mail, post);
+        }
+        batch::advance(&mut block.objects, workspace, self.simd);
+        for waiting in workspace.waiting.drain(..) {
+            block.objects[waiting.place].refresh(frame);
         }
         block.gathered.clear();
         block.refresh();
+        if let Some(took) = began.map(|began| began.elapsed()) {
+            // Bodies that are advanced together have no time of their own.
+            let share = took / block.objects.len().max(1) as u32;
+            block.objects.iter_mut().for_each(|object| object.note_cost(share));
+        }
     }
 
     fn update_object<'m>(
@@ -174,9 +184,8 @@ impl Stages {
         mail: impl Iterator<Item = &'m Message>,
         post: &mut dyn FnMut(ObjectId, ObjectId, Message),
     ) {
-        let frame = given.frame;
-        let timed = frame.is_multiple_of(FRAMES_PER_TIMING) || self.callback_budget.is_some();
-        let began = timed.then(Instant::now);
+        let Given { frame, place, .. } = given;
+        let began = self.callback_budget.map(|budget| (Instant::now(), budget));
         let mut input = Input {
             frame,
             time_step: self.time_step,
@@ -188,22 +197,24 @@ impl Stages {
             workspace: given.workspace,
             post,
         };
+        let mut waits = false;
         let done = catch_unwind(AssertUnwindSafe(|| {
             for message in mail {
                 object.process(message, frame);
             }
             if object.quarantined().is_none() && !object.is_fixed() {
-                object.behavior.update(&mut object.geometry, &mut input);
+                // Together no object has a time of its own to measure.
+                waits = self.callback_budget.is_none() && batch::begin(object, place, &mut input);
+                if !waits {
+                    object.behavior.update(&mut object.geometry, &mut input);
+                }
             }
         }));
-        let took = began.map(|began| began.elapsed());
-        if let Some(took) = took {
-            object.note_cost(took);
-        }
         if done.is_err() {
             object.quarantine(Fault { kind: FaultKind::Panicked, frame });
-        } else if self.callback_budget.is_some_and(|budget| took.is_some_and(|took| took > budget))
-        {
+        } else if waits {
+            // Its springs are advanced with those of others, and then it is refreshed.
+        } else if began.is_some_and(|(began, budget)| began.elapsed() > budget) {
             object.quarantine(Fault { kind: FaultKind::OverBudget, frame });
         } else if object.quarantined().is_none() {
             object.refresh(frame);
@@ -228,6 +239,8 @@ pub(crate) fn draw(object: &Object, renderer: &mut dyn Renderer) {
 /// What an object's update is given by its block.
 struct Given<'a> {
     frame: u64,
+    /// The object's place in the block.
+    place: usize,
     segments: &'a [Segment],
     records: &'a [Contact],
     workspace: &'a mut Workspace,

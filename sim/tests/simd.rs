@@ -3,11 +3,13 @@
 mod common;
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use common::{Reference, particles, run, serial};
-use dualframe_sim::behavior::MassSpring;
-use dualframe_sim::geometry::{Geometry, Mesh, Topology};
-use dualframe_sim::object::{Group, Object, ObjectId};
+use dualframe_sim::behavior::{Behavior, MassSpring};
+use dualframe_sim::geometry::{Geometry, Mesh, Topology, Vectors};
+use dualframe_sim::message::Message;
+use dualframe_sim::object::{FaultKind, Group, Object, ObjectId};
 use dualframe_sim::scene::Scene;
 use dualframe_sim::simd::{Instructions, Simd};
 use dualframe_sim::stages::Stages;
@@ -45,7 +47,10 @@ fn available() -> Vec<Simd> {
     #[cfg(target_arch = "x86_64")]
     for (instructions, there) in [
         (Instructions::Avx2, is_x86_feature_detected!("avx2")),
-        (Instructions::Avx512, is_x86_feature_detected!("avx512f")),
+        (
+            Instructions::Avx512,
+            is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl"),
+        ),
     ] {
         assert_eq!(widths.contains(&instructions), there, "{instructions:?}");
     }
@@ -66,9 +71,8 @@ fn whole_scenes() {
     assert!(states.iter().all(|state| *state == states[0]), "{states:?}");
 }
 
-/// A body with random springs; some nodes are held, some have no spring.
-fn body(seed: u64) -> Object {
-    let mut random = Random(seed);
+/// Nodes with random springs, some without any, and where the nodes are.
+fn make(random: &mut Random) -> (Arc<Topology>, Vec<Vec3>) {
     let nodes = 3 + random.below(198);
     let positions: Vec<Vec3> = (0..nodes).map(|_| random.vector()).collect();
     let mut edges = Vec::new();
@@ -80,32 +84,65 @@ fn body(seed: u64) -> Object {
     }
     let to_center = random.below(2) == 0;
     let topology = Topology::new(&positions, Vec::new(), &edges, to_center).expect("its own nodes");
-    let mass = |random: &mut Random| if random.below(8) == 0 { 0.0 } else { 1.0 };
-    let masses: Vec<f32> = (0..nodes).map(|_| mass(&mut random) * 0.3).collect();
+    (Arc::new(topology), positions)
+}
+
+/// A body of that make, stretched, some nodes of it held.
+fn body_of(
+    (topology, positions): &(Arc<Topology>, Vec<Vec3>),
+    id: u32,
+    random: &mut Random,
+) -> Object {
+    let mass = |random: &mut Random| {
+        if random.below(8) == 0 { 0.0 } else { 0.3 + random.vector().x / 8.0 }
+    };
+    let masses: Vec<f32> = positions.iter().map(|_| mass(random)).collect();
     let stretched: Vec<Vec3> = positions.iter().map(|p| *p * 1.1 + random.vector()).collect();
-    let mut mesh = Mesh::new(Arc::new(topology), &stretched, &masses, 0.1).expect("a mass each");
-    for node in 0..nodes {
+    let mesh = Mesh::new(Arc::clone(topology), &stretched, &masses, 0.1);
+    let mut mesh = mesh.expect("a mass each");
+    for node in 0..positions.len() {
         mesh.velocities.set(node, random.vector());
     }
-    let damping = if random.below(2) == 0 { 0.0 } else { 0.01 };
-    let springs = MassSpring::new(1.0, damping, 1 + random.below(4) as u32).expect("allowed");
-    let springs = springs.with_center_stiffness(2.0).expect("allowed");
-    Object::new(ObjectId(0), Group(0), Geometry::Mesh(mesh), springs)
+    let damping = if random.below(2) == 0 { 0.0 } else { 0.01 + random.vector().x / 128.0 };
+    let stiffness = 1.0 + random.vector().x / 8.0;
+    let springs = MassSpring::new(stiffness, damping, 1 + random.below(10) as u32);
+    let mut springs = springs.expect("allowed").with_center_stiffness(2.0).expect("allowed");
+    springs.process(&Message::Weightless(random.below(4) == 0));
+    Object::new(ObjectId(id), Group(0), Geometry::Mesh(mesh), springs)
+}
+
+fn body(seed: u64) -> Object {
+    let mut random = Random(seed);
+    let make = make(&mut random);
+    body_of(&make, 0, &mut random)
+}
+
+/// The bits of a body's positions and velocities.
+fn bits(object: &Object) -> Vec<u32> {
+    let mesh = object.geometry.as_mesh().expect("a body");
+    let vectors = mesh.positions.iter().chain(mesh.velocities.iter());
+    vectors.flat_map(|vector| vector.to_array().map(f32::to_bits)).collect()
+}
+
+fn stages(simd: Simd) -> Stages {
+    Stages { simd, gravity: Vec3::new(0.1, -9.81, 0.3), ..common::no_rules() }
+}
+
+/// What becomes of objects in five frames, in blocks of so many.
+fn outcome(objects: Vec<Object>, stages: Stages, size: usize) -> Vec<Object> {
+    let mut reference = Reference::new(Scene { objects, stages }, size);
+    for _ in 0..5 {
+        reference.step();
+    }
+    let snapshots = reference.blocks.iter().flat_map(|block| block.objects());
+    snapshots.map(Object::snapshot).collect()
 }
 
 /// The bits of a body's state after some frames.
 fn state(seed: u64, simd: Simd) -> Vec<u32> {
-    let gravity = Vec3::new(0.1, -9.81, 0.3);
-    let stages = Stages { simd, gravity, ..common::no_rules() };
-    let mut reference = Reference::new(Scene { objects: vec![body(seed)], stages }, 1);
-    for _ in 0..5 {
-        reference.step();
-    }
-    let object = &reference.blocks[0].objects()[0];
-    assert_eq!(object.quarantined(), None, "seed {seed}");
-    let mesh = object.geometry.as_mesh().expect("a body");
-    let vectors = mesh.positions.iter().chain(mesh.velocities.iter());
-    vectors.flat_map(|vector| vector.to_array().map(f32::to_bits)).collect()
+    let objects = outcome(vec![body(seed)], stages(simd), 1);
+    assert_eq!(objects[0].quarantined(), None, "seed {seed}");
+    bits(&objects[0])
 }
 
 #[test]
@@ -123,6 +160,62 @@ fn random_bodies() {
         }
     }
     assert!(differ, "all bodies are alike");
+}
+
+/// Bodies of three makes by turns.
+fn bodies(seed: u64, count: u32) -> Vec<Object> {
+    let mut random = Random(seed);
+    let makes = [make(&mut random), make(&mut random), make(&mut random)];
+    (0..count).map(|id| body_of(&makes[id as usize % 3], id, &mut random)).collect()
+}
+
+#[test]
+fn bodies_beside_others() {
+    for seed in 0..20 {
+        let expected = outcome(bodies(seed, 100), stages(Simd::detect()), 1);
+        let expected: Vec<_> = expected.iter().map(bits).collect();
+        assert_ne!(expected[0], expected[3], "all bodies are alike");
+        for simd in available() {
+            for size in [1, 7, 30, 100] {
+                let objects = outcome(bodies(seed, 100), stages(simd), size);
+                for (object, expected) in objects.iter().zip(&expected) {
+                    assert_eq!(object.quarantined(), None);
+                    let name = simd.instructions().name();
+                    assert_eq!(bits(object), *expected, "{name}, {size} a block, seed {seed}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_limit_on_time_changes_nothing_else() {
+    let budget = Some(Duration::from_secs(3_600));
+    let together = outcome(bodies(1, 60), stages(Simd::detect()), 60);
+    let limited = Stages { callback_budget: budget, ..stages(Simd::detect()) };
+    let limited = outcome(bodies(1, 60), limited, 60);
+    assert!(together.iter().map(bits).eq(limited.iter().map(bits)));
+}
+
+#[test]
+fn a_broken_body_harms_none_beside_it() {
+    for simd in available() {
+        let expected = outcome(bodies(2, 60), stages(simd), 60);
+        for kind in [FaultKind::NonFinite, FaultKind::Panicked] {
+            let mut objects = bodies(2, 60);
+            let mesh = objects[30].geometry.as_mesh_mut().expect("a body");
+            match kind {
+                FaultKind::NonFinite => mesh.velocities.set(1, Vec3::new(0.0, f32::NAN, 0.0)),
+                _ => mesh.positions = Vectors::zeros(1),
+            }
+            let objects = outcome(objects, stages(simd), 60);
+            for (place, (object, expected)) in objects.iter().zip(&expected).enumerate() {
+                let fault = object.quarantined().map(|fault| fault.kind);
+                assert_eq!(fault, (place == 30).then_some(kind), "{place}");
+                assert!(place == 30 || bits(object) == bits(expected), "{place}, {kind:?}");
+            }
+        }
+    }
 }
 
 #[test]

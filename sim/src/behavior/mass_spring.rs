@@ -5,8 +5,8 @@ use std::hash::Hasher;
 use glam::Vec3;
 use thiserror::Error;
 
-use super::spring_kernel::Advance;
-use super::{Behavior, Input};
+use super::spring_kernel::Springs;
+use super::{Behavior, Input, batch};
 use crate::geometry::{Geometry, Mesh, Spring};
 use crate::interaction::Contact;
 use crate::message::Message;
@@ -108,9 +108,9 @@ fn check(what: &'static str, value: f32) -> Result<(), MassSpringError> {
     }
 }
 
-impl Behavior for MassSpring {
-    fn update(&mut self, geometry: &mut Geometry, input: &mut Input<'_>) {
-        let Some(mesh) = geometry.as_mesh_mut() else { return };
+impl MassSpring {
+    /// Begins an update: what the frame's contacts do. What is left are the springs.
+    pub(super) fn begin(&self, mesh: &mut Mesh, input: &Input<'_>) -> Springs {
         for contact in input.contacts() {
             let impulse = Vec3::from_array(contact.impulse);
             match contact.node {
@@ -118,18 +118,22 @@ impl Behavior for MassSpring {
                 node => mesh.apply_impulse(node, impulse),
             }
         }
-        let parts = mesh.kernel_parts();
-        let chunks = parts.topology.present().len();
-        input.simd.for_look_up(chunks).run(Advance {
-            parts,
-            workspace: input.workspace,
+        Springs {
             damping: self.damping,
             stiffness: self.stiffness,
             center_stiffness: self.center_stiffness,
             gravity: if self.weightless { [0.0; 3] } else { input.gravity.to_array() },
             time: input.time_step,
             substeps: self.substeps,
-        });
+        }
+    }
+}
+
+impl Behavior for MassSpring {
+    fn update(&mut self, geometry: &mut Geometry, input: &mut Input<'_>) {
+        let Some(mesh) = geometry.as_mesh_mut() else { return };
+        let springs = self.begin(mesh, input);
+        batch::advance_alone(mesh, springs, input.workspace, input.simd);
     }
 
     fn process(&mut self, message: &Message) {

@@ -1,10 +1,13 @@
 //! The behaviour manager of an object (Fig. 2): how it changes from frame to frame.
 
+mod abreast;
+pub(crate) mod batch;
 mod fixed;
 mod mass_spring;
 mod scripted;
 #[allow(unsafe_code)]
 mod spring_kernel;
+mod spring_law;
 
 use std::any::Any;
 use std::hash::Hasher;
@@ -14,8 +17,8 @@ use glam::Vec3;
 use crate::geometry::Geometry;
 use crate::interaction::Contact;
 use crate::message::Message;
-use crate::object::ObjectId;
-use crate::simd::{Lanes3, Quad, Simd};
+use crate::object::{Object, ObjectId};
+use crate::simd::Simd;
 
 pub use fixed::Fixed;
 pub use mass_spring::{MassSpring, MassSpringError};
@@ -76,15 +79,20 @@ pub(crate) struct Segment {
     pub(crate) end: usize,
 }
 
-/// Memory that the updates of a block's objects use one after the other.
+/// Memory that the updates of a block's objects use.
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
-    /// Of one body, in metres.
-    positions: Vec<Lanes3>,
-    /// Of one body, in metres per second.
-    velocities: Vec<Lanes3>,
-    /// What the springs to the centre pull at each node, in newtons.
-    pulled: Vec<Lanes3>,
-    /// Where positions and velocities are looked up.
-    tables: [Vec<Quad>; 2],
+    alone: spring_kernel::Nodes,
+    /// Bodies whose springs are left to be advanced.
+    pub(crate) waiting: Vec<batch::Waiting>,
+}
+
+impl Workspace {
+    /// Makes room for these objects, so that no frame need allocate.
+    pub(crate) fn reserve(&mut self, objects: &[Object]) {
+        self.waiting.reserve(objects.len());
+        let meshes = objects.iter().filter_map(|object| object.geometry.as_mesh());
+        let Some(nodes) = meshes.map(|mesh| mesh.topology().nodes()).max() else { return };
+        self.alone.reserve(nodes);
+    }
 }

@@ -147,6 +147,11 @@ impl Mesh {
         self.positions.is_finite() && self.velocities.is_finite()
     }
 
+    /// Whether positions and velocities, which anybody may replace, are as many as there are nodes.
+    pub(crate) fn is_whole(&self) -> bool {
+        [&self.positions, &self.velocities].iter().all(|list| list.len() == self.topology.nodes())
+    }
+
     /// Becomes a copy of another mesh without giving up memory.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         if !Arc::ptr_eq(&self.topology, &other.topology) {

@@ -49,7 +49,8 @@ pub struct Object {
     quarantined: Option<Fault>,
     bounds: Bounds,
     center: Vec3,
-    /// What an update takes, in seconds, by the last ones that were timed; 0 before the first.
+    /// What an update takes, in seconds, as its share of its block's last ones that were timed; 0 before
+    /// the first.
     cost: f32,
     /// What it looks like.
     pub visual: VisualProperties,
@@ -135,7 +136,8 @@ impl Object {
         self.center
     }
 
-    /// What an update takes, in seconds, by the last ones that were timed; 0 before the first.
+    /// What an update takes, in seconds, as its share of its block's last ones that were timed; 0 before
+    /// the first.
     pub(crate) fn cost(&self) -> f32 {
         self.cost
     }

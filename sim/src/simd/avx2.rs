@@ -2,29 +2,37 @@
 
 use std::arch::x86_64::*;
 
-use super::{Isa, Kernel, LaneSet, Lanes3, Quad};
+use super::{Arithmetic, HALF, HalfIsa, HalfLanes, Isa, Kernel, LaneSet, Lanes3, Quad};
 use crate::geometry::{LANES, Lanes};
-
-/// Lanes of one register.
-const HALF: usize = LANES / 2;
 
 /// The proof that the machine has AVX2. There is none without.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Avx2(());
+pub(super) struct Avx2(Avx2Half);
 
 impl Avx2 {
     pub(super) fn detect() -> Option<Self> {
-        is_x86_feature_detected!("avx2").then_some(Self(()))
+        is_x86_feature_detected!("avx2").then_some(Self(Avx2Half(())))
     }
 
     pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
         // SAFETY: the machine has AVX2, or there were no `self`.
         unsafe { with_avx2(self, kernel) }
     }
+}
 
-    /// The sum over eight lanes, in halves.
+#[target_feature(enable = "avx2")]
+fn with_avx2<K: Kernel>(avx2: Avx2, kernel: K) -> K::Output {
+    kernel.run(avx2)
+}
+
+/// The same proof, for eight lanes in one register.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Avx2Half(());
+
+impl Avx2Half {
+    /// The sum over the lanes, in halves.
     #[inline(always)]
-    pub(super) fn sum_of_half(self, half: __m256) -> f32 {
+    pub(super) fn sum(self, half: __m256) -> f32 {
         // SAFETY: the machine has AVX2, or there were no `self`.
         unsafe {
             let four = _mm_add_ps(_mm256_castps256_ps128(half), _mm256_extractf128_ps::<1>(half));
@@ -66,7 +74,7 @@ impl Avx2 {
     /// Each of them is in the table.
     #[inline(always)]
     unsafe fn read_quads(self, table: &[Quad], nodes: &[u32]) -> [__m256; 3] {
-        let mut pairs = [self.splat(0.0)[0]; HALF / 2];
+        let mut pairs = [self.splat(0.0); HALF / 2];
         for (lane, pair) in pairs.iter_mut().enumerate() {
             let (first, second) = (nodes[lane] as usize, nodes[lane + HALF / 2] as usize);
             // SAFETY: the machine has AVX2, or there were no `self`; the caller promises that the
@@ -91,92 +99,180 @@ impl Avx2 {
     }
 }
 
+impl Arithmetic for Avx2Half {
+    type Lanes = HalfLanes;
+    type Vector = __m256;
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> __m256 {
+        // SAFETY: the machine has AVX2, or there were no `self`.
+        unsafe { _mm256_set1_ps(value) }
+    }
+
+    #[inline(always)]
+    fn load(self, lanes: &HalfLanes) -> __m256 {
+        // SAFETY: as in `splat`; the pointer is that of eight numbers.
+        unsafe { _mm256_loadu_ps(lanes.as_ptr()) }
+    }
+
+    #[inline(always)]
+    fn store(self, vector: __m256, lanes: &mut HalfLanes) {
+        // SAFETY: as in `splat`; the pointer is that of eight numbers.
+        unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), vector) }
+    }
+
+    #[inline(always)]
+    fn add(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm256_add_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn sub(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm256_sub_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn mul(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm256_mul_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn div(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm256_div_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn sqrt(self, a: __m256) -> __m256 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm256_sqrt_ps(a) }
+    }
+}
+
+impl HalfIsa for Avx2Half {
+    #[inline(always)]
+    fn transpose(self, [a, b, c, d, e, f, g, h]: [__m256; HALF]) -> [__m256; HALF] {
+        // SAFETY: the machine has AVX2, or there were no `self`.
+        unsafe {
+            let [low_a, low_b, low_c, low_d] = transpose_quarters([a, b, c, d]);
+            let [high_a, high_b, high_c, high_d] = transpose_quarters([e, f, g, h]);
+            [
+                _mm256_permute2f128_ps::<0x20>(low_a, high_a),
+                _mm256_permute2f128_ps::<0x20>(low_b, high_b),
+                _mm256_permute2f128_ps::<0x20>(low_c, high_c),
+                _mm256_permute2f128_ps::<0x20>(low_d, high_d),
+                _mm256_permute2f128_ps::<0x31>(low_a, high_a),
+                _mm256_permute2f128_ps::<0x31>(low_b, high_b),
+                _mm256_permute2f128_ps::<0x31>(low_c, high_c),
+                _mm256_permute2f128_ps::<0x31>(low_d, high_d),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    fn choose(self, chooser: __m256, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm256_or_ps(_mm256_and_ps(chooser, a), _mm256_andnot_ps(chooser, b)) }
+    }
+}
+
+/// Transposes four by four numbers in either half of the registers.
 #[target_feature(enable = "avx2")]
-fn with_avx2<K: Kernel>(avx2: Avx2, kernel: K) -> K::Output {
-    kernel.run(avx2)
+#[inline]
+fn transpose_quarters([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
+    let (ab_low, ab_high) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+    let (cd_low, cd_high) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+    [
+        _mm256_shuffle_ps::<0b01_00_01_00>(ab_low, cd_low),
+        _mm256_shuffle_ps::<0b11_10_11_10>(ab_low, cd_low),
+        _mm256_shuffle_ps::<0b01_00_01_00>(ab_high, cd_high),
+        _mm256_shuffle_ps::<0b11_10_11_10>(ab_high, cd_high),
+    ]
 }
 
 /// Two registers.
 type Pair = [__m256; 2];
 
-impl Isa for Avx2 {
+impl Arithmetic for Avx2 {
+    type Lanes = Lanes;
     type Vector = Pair;
-    type Table<'a> = &'a [Quad];
 
     #[inline(always)]
     fn splat(self, value: f32) -> Pair {
-        // SAFETY: the machine has AVX2, or there were no `self`.
-        unsafe { [_mm256_set1_ps(value); 2] }
+        [self.0.splat(value); 2]
     }
 
     #[inline(always)]
     fn load(self, lanes: &Lanes) -> Pair {
-        let (low, high) = lanes.split_at(HALF);
-        // SAFETY: as in `splat`; each pointer is that of eight numbers.
-        unsafe { [_mm256_loadu_ps(low.as_ptr()), _mm256_loadu_ps(high.as_ptr())] }
+        let (halves, _) = lanes.as_chunks();
+        [self.0.load(&halves[0]), self.0.load(&halves[1])]
     }
 
     #[inline(always)]
     fn store(self, vector: Pair, lanes: &mut Lanes) {
-        let (low, high) = lanes.split_at_mut(HALF);
-        // SAFETY: as in `splat`; each pointer is that of eight numbers.
-        unsafe {
-            _mm256_storeu_ps(low.as_mut_ptr(), vector[0]);
-            _mm256_storeu_ps(high.as_mut_ptr(), vector[1]);
-        }
+        let (halves, _) = lanes.as_chunks_mut();
+        self.0.store(vector[0], &mut halves[0]);
+        self.0.store(vector[1], &mut halves[1]);
     }
 
     #[inline(always)]
     fn add(self, a: Pair, b: Pair) -> Pair {
-        // SAFETY: as in `splat`.
-        unsafe { [_mm256_add_ps(a[0], b[0]), _mm256_add_ps(a[1], b[1])] }
+        [self.0.add(a[0], b[0]), self.0.add(a[1], b[1])]
     }
 
     #[inline(always)]
     fn sub(self, a: Pair, b: Pair) -> Pair {
-        // SAFETY: as in `splat`.
-        unsafe { [_mm256_sub_ps(a[0], b[0]), _mm256_sub_ps(a[1], b[1])] }
+        [self.0.sub(a[0], b[0]), self.0.sub(a[1], b[1])]
     }
 
     #[inline(always)]
     fn mul(self, a: Pair, b: Pair) -> Pair {
-        // SAFETY: as in `splat`.
-        unsafe { [_mm256_mul_ps(a[0], b[0]), _mm256_mul_ps(a[1], b[1])] }
+        [self.0.mul(a[0], b[0]), self.0.mul(a[1], b[1])]
     }
 
     #[inline(always)]
     fn div(self, a: Pair, b: Pair) -> Pair {
-        // SAFETY: as in `splat`.
-        unsafe { [_mm256_div_ps(a[0], b[0]), _mm256_div_ps(a[1], b[1])] }
+        [self.0.div(a[0], b[0]), self.0.div(a[1], b[1])]
     }
 
     #[inline(always)]
     fn sqrt(self, a: Pair) -> Pair {
-        // SAFETY: as in `splat`.
-        unsafe { [_mm256_sqrt_ps(a[0]), _mm256_sqrt_ps(a[1])] }
+        [self.0.sqrt(a[0]), self.0.sqrt(a[1])]
+    }
+}
+
+impl Isa for Avx2 {
+    type Half = Avx2Half;
+    type Table<'a> = &'a [Quad];
+
+    #[inline(always)]
+    fn half(self) -> Avx2Half {
+        self.0
     }
 
     #[inline(always)]
     fn sum(self, vector: Pair) -> f32 {
-        // SAFETY: as in `splat`.
-        self.sum_of_half(unsafe { _mm256_add_ps(vector[0], vector[1]) })
+        self.0.sum(self.0.add(vector[0], vector[1]))
     }
 
     #[inline(always)]
     fn min(self, a: Pair, b: Pair) -> Pair {
-        // SAFETY: as in `splat`.
+        // SAFETY: the machine has AVX2, or there were no `self`.
         unsafe { [_mm256_min_ps(a[0], b[0]), _mm256_min_ps(a[1], b[1])] }
     }
 
     #[inline(always)]
     fn max(self, a: Pair, b: Pair) -> Pair {
-        // SAFETY: as in `splat`.
+        // SAFETY: the machine has AVX2, or there were no `self`.
         unsafe { [_mm256_max_ps(a[0], b[0]), _mm256_max_ps(a[1], b[1])] }
     }
 
     #[inline(always)]
     fn less(self, a: Pair, b: Pair) -> LaneSet {
-        // SAFETY: as in `splat`.
+        // SAFETY: the machine has AVX2, or there were no `self`.
         let set = |half: usize| unsafe {
             _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a[half], b[half]))
         };
@@ -185,7 +281,7 @@ impl Isa for Avx2 {
 
     #[inline(always)]
     fn at_most(self, a: Pair, b: Pair) -> LaneSet {
-        // SAFETY: as in `splat`.
+        // SAFETY: the machine has AVX2, or there were no `self`.
         let set = |half: usize| unsafe {
             _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a[half], b[half]))
         };
@@ -202,7 +298,7 @@ impl Isa for Avx2 {
         for (quads, Lanes3([x, y, z])) in quads.chunks_exact_mut(LANES).zip(chunks) {
             let (x, y, z) = (self.load(x), self.load(y), self.load(z));
             for (half, quads) in quads.chunks_exact_mut(HALF).enumerate() {
-                self.write_quads([x[half], y[half], z[half]], quads);
+                self.0.write_quads([x[half], y[half], z[half]], quads);
             }
         }
         quads
@@ -212,7 +308,8 @@ impl Isa for Avx2 {
     unsafe fn look_up(self, table: &[Quad], nodes: &[u32; LANES]) -> [Pair; 3] {
         let (low, high) = nodes.split_at(HALF);
         // SAFETY: the caller promises that they are in the table.
-        let (low, high) = unsafe { (self.read_quads(table, low), self.read_quads(table, high)) };
+        let (low, high) =
+            unsafe { (self.0.read_quads(table, low), self.0.read_quads(table, high)) };
         [[low[0], high[0]], [low[1], high[1]], [low[2], high[2]]]
     }
 }

@@ -3,11 +3,11 @@
 
 use std::arch::x86_64::*;
 
-use super::avx2::Avx2;
-use super::{Isa, Kernel, LaneSet, Lanes3, Quad};
+use super::avx2::{Avx2, Avx2Half};
+use super::{Arithmetic, Isa, Kernel, LaneSet, Lanes3, Quad};
 use crate::geometry::{LANES, Lanes};
 
-/// The proof that the machine has AVX-512F. There is none without.
+/// The proof that the machine has AVX-512F and AVX-512VL. There is none without.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Avx512(Avx2);
 
@@ -17,7 +17,8 @@ impl Avx512 {
 
     pub(super) fn detect() -> Option<Self> {
         let avx2 = Avx2::detect()?;
-        is_x86_feature_detected!("avx512f").then_some(Self(avx2))
+        (is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl"))
+            .then_some(Self(avx2))
     }
 
     pub(super) fn avx2(self) -> Avx2 {
@@ -25,23 +26,23 @@ impl Avx512 {
     }
 
     pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        // SAFETY: the machine has AVX-512F, or there were no `self`.
+        // SAFETY: the machine has AVX-512F and VL, or there were no `self`.
         unsafe { with_avx512(self, kernel) }
     }
 }
 
-#[target_feature(enable = "avx512f")]
+#[target_feature(enable = "avx512f,avx512vl")]
 fn with_avx512<K: Kernel>(avx512: Avx512, kernel: K) -> K::Output {
     kernel.run(avx512)
 }
 
-impl Isa for Avx512 {
+impl Arithmetic for Avx512 {
+    type Lanes = Lanes;
     type Vector = __m512;
-    type Table<'a> = [[__m512; 3]; Avx512::MOST_CHUNKS];
 
     #[inline(always)]
     fn splat(self, value: f32) -> __m512 {
-        // SAFETY: the machine has AVX-512F, or there were no `self`.
+        // SAFETY: the machine has AVX-512F and VL, or there were no `self`.
         unsafe { _mm512_set1_ps(value) }
     }
 
@@ -86,6 +87,16 @@ impl Isa for Avx512 {
         // SAFETY: as in `splat`.
         unsafe { _mm512_sqrt_ps(a) }
     }
+}
+
+impl Isa for Avx512 {
+    type Half = Avx2Half;
+    type Table<'a> = [[__m512; 3]; Avx512::MOST_CHUNKS];
+
+    #[inline(always)]
+    fn half(self) -> Avx2Half {
+        self.0.half()
+    }
 
     #[inline(always)]
     fn sum(self, vector: __m512) -> f32 {
@@ -94,7 +105,7 @@ impl Isa for Avx512 {
             let upper = _mm512_extractf64x4_pd::<1>(_mm512_castps_pd(vector));
             _mm256_add_ps(_mm512_castps512_ps256(vector), _mm256_castpd_ps(upper))
         };
-        self.0.sum_of_half(half)
+        self.half().sum(half)
     }
 
     #[inline(always)]

@@ -14,7 +14,7 @@ mod scalar;
 
 use thiserror::Error;
 
-use self::scalar::Scalar;
+use self::scalar::Plain;
 use crate::geometry::{LANES, Lanes};
 
 #[cfg(target_arch = "x86_64")]
@@ -27,7 +27,7 @@ pub enum Instructions {
     Scalar,
     /// AVX2, on x86-64.
     Avx2,
-    /// AVX-512F, on x86-64.
+    /// AVX-512F and AVX-512VL, on x86-64.
     Avx512,
 }
 
@@ -130,7 +130,7 @@ impl Simd {
     #[inline]
     pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
         match self.0 {
-            Kind::Scalar => kernel.run(Scalar),
+            Kind::Scalar => kernel.run(Plain),
             #[cfg(target_arch = "x86_64")]
             Kind::Avx2(avx2) => avx2.run(kernel),
             #[cfg(target_arch = "x86_64")]
@@ -149,21 +149,40 @@ pub(crate) trait Kernel {
     fn run<I: Isa>(self, isa: I) -> Self::Output;
 }
 
-/// The operations on [`LANES`] numbers at once.
-pub(crate) trait Isa: Copy {
-    /// [`LANES`] numbers.
+/// Arithmetic on several numbers at once.
+pub(crate) trait Arithmetic: Copy {
+    /// So many numbers.
+    type Lanes;
+    /// The same, ready to be computed with.
     type Vector: Copy;
-    /// Vectors of a body's nodes, ready to be looked up by the nodes' numbers.
-    type Table<'a>: Copy;
 
     fn splat(self, value: f32) -> Self::Vector;
-    fn load(self, lanes: &Lanes) -> Self::Vector;
-    fn store(self, vector: Self::Vector, lanes: &mut Lanes);
+    fn load(self, lanes: &Self::Lanes) -> Self::Vector;
+    fn store(self, vector: Self::Vector, lanes: &mut Self::Lanes);
     fn add(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
     fn sub(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
     fn mul(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
     fn div(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
     fn sqrt(self, a: Self::Vector) -> Self::Vector;
+}
+
+/// The operations on half of [`LANES`] numbers at once.
+pub(crate) trait HalfIsa: Arithmetic<Lanes = HalfLanes> {
+    /// Rows become columns.
+    fn transpose(self, rows: [Self::Vector; HALF]) -> [Self::Vector; HALF];
+
+    /// The bits of `a` where those of `chooser` are set, of `b` elsewhere.
+    fn choose(self, chooser: Self::Vector, a: Self::Vector, b: Self::Vector) -> Self::Vector;
+}
+
+/// The operations on [`LANES`] numbers at once.
+pub(crate) trait Isa: Arithmetic<Lanes = Lanes> {
+    /// The same instructions on half as many numbers.
+    type Half: HalfIsa;
+    /// Vectors of a body's nodes, ready to be looked up by the nodes' numbers.
+    type Table<'a>: Copy;
+
+    fn half(self) -> Self::Half;
 
     /// Makes a table of vectors. `room` is memory that the table may use, of any content.
     fn table<'a>(self, chunks: &[Lanes3], room: &'a mut Vec<Quad>) -> Self::Table<'a>;
@@ -233,6 +252,12 @@ pub(crate) fn first_lanes(count: usize) -> LaneSet {
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 pub(crate) struct Lanes3(pub(crate) [Lanes; 3]);
+
+/// Half of [`LANES`].
+pub(crate) const HALF: usize = LANES / 2;
+
+/// So many numbers.
+pub(crate) type HalfLanes = [f32; HALF];
 
 /// The components x, y, z of one node and a number of no meaning.
 pub(crate) type Quad = [f32; 4];

@@ -1,15 +1,19 @@
 //! Lanes as plain arrays, which the compiler makes into whatever the target's baseline has.
 
-use super::{Isa, LaneSet, Lanes3, Quad, fold};
+use super::{Arithmetic, HALF, HalfIsa, HalfLanes, Isa, LaneSet, Lanes3, Quad, fold};
 use crate::geometry::{LANES, Lanes};
 
+/// Lanes of which there are so many.
 #[derive(Clone, Copy)]
-pub(super) struct Scalar;
+pub(super) struct Plain<const N: usize>;
+
+/// All of them.
+pub(super) type Scalar = Plain<LANES>;
 
 #[inline(always)]
-fn each(a: Lanes, b: Lanes, operation: impl Fn(f32, f32) -> f32) -> Lanes {
-    let mut result = [0.0; LANES];
-    for lane in 0..LANES {
+fn each<const N: usize>(a: [f32; N], b: [f32; N], operation: impl Fn(f32, f32) -> f32) -> [f32; N] {
+    let mut result = [0.0; N];
+    for lane in 0..N {
         result[lane] = operation(a[lane], b[lane]);
     }
     result
@@ -24,48 +28,81 @@ fn set(a: Lanes, b: Lanes, holds: impl Fn(f32, f32) -> bool) -> LaneSet {
     set
 }
 
-impl Isa for Scalar {
-    type Vector = Lanes;
-    type Table<'a> = &'a [Quad];
+impl<const N: usize> Arithmetic for Plain<N> {
+    type Lanes = [f32; N];
+    type Vector = [f32; N];
 
     #[inline(always)]
-    fn splat(self, value: f32) -> Lanes {
-        [value; LANES]
+    fn splat(self, value: f32) -> [f32; N] {
+        [value; N]
     }
 
     #[inline(always)]
-    fn load(self, lanes: &Lanes) -> Lanes {
+    fn load(self, lanes: &[f32; N]) -> [f32; N] {
         *lanes
     }
 
     #[inline(always)]
-    fn store(self, vector: Lanes, lanes: &mut Lanes) {
+    fn store(self, vector: [f32; N], lanes: &mut [f32; N]) {
         *lanes = vector;
     }
 
     #[inline(always)]
-    fn add(self, a: Lanes, b: Lanes) -> Lanes {
+    fn add(self, a: [f32; N], b: [f32; N]) -> [f32; N] {
         each(a, b, |a, b| a + b)
     }
 
     #[inline(always)]
-    fn sub(self, a: Lanes, b: Lanes) -> Lanes {
+    fn sub(self, a: [f32; N], b: [f32; N]) -> [f32; N] {
         each(a, b, |a, b| a - b)
     }
 
     #[inline(always)]
-    fn mul(self, a: Lanes, b: Lanes) -> Lanes {
+    fn mul(self, a: [f32; N], b: [f32; N]) -> [f32; N] {
         each(a, b, |a, b| a * b)
     }
 
     #[inline(always)]
-    fn div(self, a: Lanes, b: Lanes) -> Lanes {
+    fn div(self, a: [f32; N], b: [f32; N]) -> [f32; N] {
         each(a, b, |a, b| a / b)
     }
 
     #[inline(always)]
-    fn sqrt(self, a: Lanes) -> Lanes {
+    fn sqrt(self, a: [f32; N]) -> [f32; N] {
         a.map(f32::sqrt)
+    }
+}
+
+impl HalfIsa for Plain<HALF> {
+    #[inline(always)]
+    fn transpose(self, rows: [HalfLanes; HALF]) -> [HalfLanes; HALF] {
+        let mut columns = rows;
+        for (row, values) in rows.iter().enumerate() {
+            for (column, &value) in values.iter().enumerate() {
+                columns[column][row] = value;
+            }
+        }
+        columns
+    }
+
+    #[inline(always)]
+    fn choose(self, chooser: HalfLanes, a: HalfLanes, b: HalfLanes) -> HalfLanes {
+        let mut chosen = b;
+        for lane in 0..HALF {
+            let set = chooser[lane].to_bits();
+            chosen[lane] = f32::from_bits(set & a[lane].to_bits() | !set & b[lane].to_bits());
+        }
+        chosen
+    }
+}
+
+impl Isa for Scalar {
+    type Half = Plain<HALF>;
+    type Table<'a> = &'a [Quad];
+
+    #[inline(always)]
+    fn half(self) -> Plain<HALF> {
+        Plain
     }
 
     #[inline(always)]

@@ -1,0 +1,322 @@
+//! Mass–spring bodies of one topology side by side: a whole frame of several at once, a lane each.
+//!
+//! It comes to the same bits as a body by itself (see [`spring_kernel`]), at about half the cost: every
+//! spring is computed once, added at one end and subtracted at the other. As bodies make different
+//! numbers of substeps, two may share a lane: when the first is done the second takes its place.
+//!
+//! [`spring_kernel`]: super::spring_kernel
+
+mod nodes;
+
+use std::hint::black_box;
+
+use self::nodes::{Body, Force, Node, exchange, gather, scatter};
+use super::spring_kernel::Springs;
+use super::spring_law::{Dashpot, Elastic, Law, load, minus, plus, store, times};
+use crate::geometry::{KernelParts, LANES, Spring, Topology};
+use crate::simd::{HALF, HalfIsa, HalfLanes, Isa, Kernel};
+
+pub(super) use self::nodes::Nodes;
+
+/// The most bodies that share the lanes.
+pub(super) const MOST: usize = 2 * HALF;
+
+/// The lane of a body by its place in descending order of substeps, and whether it comes second there:
+/// the longest shares with the shortest.
+pub(super) fn seat(place: usize) -> (usize, usize) {
+    if place < HALF { (0, place) } else { (1, MOST - 1 - place) }
+}
+
+/// One frame of some bodies: those first in the lanes and those second. The first lane has a body, and
+/// no lane has a second one without a first. All share their topology, whose number of nodes all their
+/// lists have, and are damped or all not.
+pub(super) struct AdvanceAbreast<'a> {
+    pub(super) bodies: [[Option<Body<'a>>; HALF]; 2],
+    pub(super) nodes: &'a mut Nodes,
+}
+
+impl Kernel for AdvanceAbreast<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) {
+        let (Self { bodies: [mut first, mut second], nodes }, isa) = (self, isa.half());
+        let Some((KernelParts { topology, .. }, springs)) = &first[0] else { return };
+        let (topology, idle) = (*topology, Seat { springs: *springs, left: 0 });
+        nodes.reserve(topology.nodes());
+        let len = topology.present().len() * LANES;
+        let ([now, next], forces) = (nodes.sets.each_mut(), &mut nodes.forces);
+        let (now, next) = (&mut now[..len], &mut next[..len]);
+        let forces = &mut forces[..topology.nodes()];
+        let mut moving = begin(isa, topology, &first, idle, (&mut *now, &mut *forces));
+        let mut later = begin(isa, topology, &second, idle, (&mut *next, &mut *forces));
+        loop {
+            let takes: [bool; HALF] =
+                std::array::from_fn(|lane| moving[lane].left == 0 && later[lane].left > 0);
+            if takes.contains(&true) {
+                exchange(isa, now, next, mask(isa, takes));
+                for lane in (0..HALF).filter(|&lane| takes[lane]) {
+                    moving[lane] = std::mem::replace(&mut later[lane], idle);
+                }
+            }
+            let left = moving.iter().map(|seat| seat.left).filter(|&left| left > 0);
+            let Some(substeps) = left.min() else { break };
+            advance(isa, topology, &moving, substeps, (&mut *now, &mut *forces));
+            for seat in &mut moving {
+                seat.left = seat.left.saturating_sub(substeps);
+            }
+        }
+        // In lanes with two bodies the first one's place is where the second one began.
+        for (first, second) in first.iter_mut().zip(&mut second) {
+            if second.is_some() {
+                std::mem::swap(first, second);
+            }
+        }
+        scatter(isa, now, &mut first);
+        scatter(isa, next, &mut second);
+    }
+}
+
+/// What a lane computes with.
+#[derive(Clone, Copy)]
+struct Seat {
+    springs: Springs,
+    /// Substeps that are left.
+    left: u32,
+}
+
+/// One number of each lane.
+#[inline(always)]
+fn numbers<H: HalfIsa>(isa: H, seats: &[Seat; HALF], number: fn(&Springs) -> f32) -> H::Vector {
+    isa.load(&seats.each_ref().map(|seat| number(&seat.springs)))
+}
+
+/// All bits of the lanes in the set.
+#[inline(always)]
+fn mask<H: HalfIsa>(isa: H, set: [bool; HALF]) -> H::Vector {
+    let bits = set.map(|set| f32::from_bits(if set { u32::MAX } else { 0 }));
+    // A compiler that sees through it makes masked stores of choices, which are slow on some machines.
+    isa.load(black_box(&bits))
+}
+
+/// Brings bodies side by side and lets the dashpots act. A lane without a body is `idle`.
+#[inline(always)]
+fn begin<H: HalfIsa>(
+    isa: H,
+    topology: &Topology,
+    bodies: &[Option<Body<'_>>; HALF],
+    idle: Seat,
+    (nodes, forces): (&mut [Node], &mut [Force]),
+) -> [Seat; HALF] {
+    let seats = bodies.each_ref().map(|body| match body {
+        Some((_, springs)) => Seat { springs: *springs, left: springs.substeps },
+        None => idle,
+    });
+    if bodies.iter().any(Option::is_some) {
+        gather(isa, bodies, nodes);
+        if idle.springs.damping > 0.0 {
+            let law = Dashpot { damping: numbers(isa, &seats, |springs| springs.damping) };
+            let time = numbers(isa, &seats, |springs| springs.time);
+            let step = Step { gravity: [isa.splat(0.0); 3], time, drifts: false };
+            step.advance(isa, topology, nodes, forces, [law, law], None);
+        }
+    }
+    seats
+}
+
+/// Makes some substeps in the lanes where some are left.
+#[inline(always)]
+fn advance<H: HalfIsa>(
+    isa: H,
+    topology: &Topology,
+    seats: &[Seat; HALF],
+    substeps: u32,
+    (nodes, forces): (&mut [Node], &mut [Force]),
+) {
+    let stiffness = numbers(isa, seats, |springs| springs.stiffness);
+    let edges = Elastic { stiffness, one: isa.splat(1.0) };
+    let stiffness = numbers(isa, seats, |springs| springs.center_stiffness);
+    let laws = [edges, Elastic { stiffness, ..edges }];
+    let gravity = [
+        numbers(isa, seats, |springs| springs.gravity[0]),
+        numbers(isa, seats, |springs| springs.gravity[1]),
+        numbers(isa, seats, |springs| springs.gravity[2]),
+    ];
+    let step = Step { gravity, time: numbers(isa, seats, Springs::step_time), drifts: true };
+    let moving = seats.each_ref().map(|seat| seat.left > 0);
+    if moving == [true; HALF] {
+        for _ in 0..substeps {
+            step.advance(isa, topology, nodes, forces, laws, None);
+        }
+    } else {
+        let moving = mask(isa, moving);
+        for _ in 0..substeps {
+            step.advance(isa, topology, nodes, forces, laws, Some(moving));
+        }
+    }
+}
+
+/// One step with one kind of force.
+#[derive(Clone, Copy)]
+struct Step<V> {
+    /// In metres per second squared.
+    gravity: [V; 3],
+    /// In seconds.
+    time: V,
+    /// Whether positions change too.
+    drifts: bool,
+}
+
+impl<V: Copy> Step<V> {
+    /// Makes the step, with one law for the springs between nodes and another for those to the centre,
+    /// in all lanes or those where the bits of `moving` are set.
+    #[inline(always)]
+    fn advance<H: HalfIsa<Vector = V>, L: Law<H>>(
+        self,
+        isa: H,
+        topology: &Topology,
+        nodes: &mut [Node],
+        forces: &mut [Force],
+        [edges, to_center]: [L; 2],
+        moving: Option<V>,
+    ) {
+        let shared = pull_to_center(isa, topology, nodes, forces, to_center);
+        edge_forces(isa, topology, nodes, forces, edges);
+        for (node, Force(force)) in nodes.iter_mut().zip(forces) {
+            let force = plus(isa, load(isa, force), shared);
+            let weight = times(isa, self.gravity, isa.load(&node.mass));
+            let factor = isa.mul(isa.load(&node.inverse_mass), self.time);
+            let before = load(isa, &node.velocity);
+            let velocity = plus(isa, before, times(isa, plus(isa, force, weight), factor));
+            store(isa, choose(isa, moving, velocity, before), &mut node.velocity);
+            if self.drifts {
+                let before = load(isa, &node.position);
+                let position = plus(isa, before, times(isa, velocity, self.time));
+                store(isa, choose(isa, moving, position, before), &mut node.position);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn choose<H: HalfIsa>(
+    isa: H,
+    chooser: Option<H::Vector>,
+    a: [H::Vector; 3],
+    b: [H::Vector; 3],
+) -> [H::Vector; 3] {
+    let Some(chooser) = chooser else { return a };
+    [
+        isa.choose(chooser, a[0], b[0]),
+        isa.choose(chooser, a[1], b[1]),
+        isa.choose(chooser, a[2], b[2]),
+    ]
+}
+
+/// Adds the forces of the springs between nodes.
+#[inline(always)]
+fn edge_forces<H: HalfIsa, L: Law<H>>(
+    isa: H,
+    topology: &Topology,
+    nodes: &[Node],
+    forces: &mut [Force],
+    law: L,
+) {
+    // Springs mostly follow others from the same node: its numbers stay at hand.
+    let mut from = 0;
+    let Some(Force(force)) = forces.first() else { return };
+    let mut force = load(isa, force);
+    let mut own = [load(isa, &nodes[from].position), load(isa, &nodes[from].velocity)];
+    for Spring { nodes: [a, b], rest } in topology.springs() {
+        let (a, b) = (*a as usize, *b as usize);
+        if a != from {
+            store(isa, force, &mut forces[from].0);
+            from = a;
+            force = load(isa, &forces[from].0);
+            own = [load(isa, &nodes[from].position), load(isa, &nodes[from].velocity)];
+        }
+        let other = &nodes[b];
+        // The way from the second end, and the force on it: what is subtracted or added may then be
+        // in memory.
+        let way = minus(isa, own[0], load(isa, &other.position));
+        let relative =
+            if L::NEEDS_VELOCITY { minus(isa, own[1], load(isa, &other.velocity)) } else { way };
+        let pulled = times(isa, way, law.pull(isa, way, relative, isa.splat(*rest)));
+        force = minus(isa, force, pulled);
+        let Force(other) = &mut forces[b];
+        store(isa, plus(isa, load(isa, other), pulled), other);
+    }
+    store(isa, force, &mut forces[from].0);
+}
+
+/// Sets the forces to those of the springs to the centre, and returns the force on all nodes of a body
+/// alike: their share of what is pulled at its centre. All in newtons.
+#[inline(always)]
+fn pull_to_center<H: HalfIsa, L: Law<H>>(
+    isa: H,
+    topology: &Topology,
+    nodes: &[Node],
+    forces: &mut [Force],
+    law: L,
+) -> [H::Vector; 3] {
+    let zero = [isa.splat(0.0); 3];
+    let Some(rests) = topology.center_rest() else {
+        forces.fill(Force::default());
+        return zero;
+    };
+    let nodes = &nodes[..forces.len()];
+    let share = 1.0 / nodes.len() as f32;
+    let center = sum(isa, nodes, |node| &node.position);
+    let center = times(isa, center, isa.splat(share));
+    let velocity = if L::NEEDS_VELOCITY { sum(isa, nodes, |node| &node.velocity) } else { zero };
+    let velocity = times(isa, velocity, isa.splat(share));
+    for ((node, Force(force)), rest) in nodes.iter().zip(&mut *forces).zip(rests) {
+        let way = minus(isa, center, load(isa, &node.position));
+        let relative =
+            if L::NEEDS_VELOCITY { minus(isa, velocity, load(isa, &node.velocity)) } else { way };
+        let pull = law.pull(isa, way, relative, isa.splat(*rest));
+        store(isa, times(isa, way, pull), force);
+    }
+    let total = sum(isa, forces, |force| &force.0);
+    plus(isa, times(isa, total, isa.splat(-share)), zero)
+}
+
+/// The sum over a body's nodes in the order in which a body by itself takes it: over every
+/// [`LANES`]th node, then these sums as in [`fold`].
+///
+/// [`fold`]: crate::simd::fold
+#[inline(always)]
+fn sum<H: HalfIsa, T>(isa: H, nodes: &[T], of: fn(&T) -> &[HalfLanes; 3]) -> [H::Vector; 3] {
+    let zero = [isa.splat(0.0); 3];
+    let mut sums = [zero; HALF];
+    for (lane, sum) in sums.iter_mut().enumerate() {
+        let (low, high) = (every(isa, nodes, lane, of), every(isa, nodes, lane + HALF, of));
+        *sum = plus(isa, low, high);
+    }
+    let mut half = HALF / 2;
+    while half > 0 {
+        for lane in 0..half {
+            sums[lane] = plus(isa, sums[lane], sums[lane + half]);
+        }
+        half /= 2;
+    }
+    // The other order begins with 0, which makes +0 of −0.
+    plus(isa, sums[0], zero)
+}
+
+/// The sum over every [`LANES`]th node from the first given on.
+#[inline(always)]
+fn every<H: HalfIsa, T>(
+    isa: H,
+    nodes: &[T],
+    first: usize,
+    of: fn(&T) -> &[HalfLanes; 3],
+) -> [H::Vector; 3] {
+    let mut rest = nodes.iter().skip(first).step_by(LANES);
+    let Some(node) = rest.next() else { return [isa.splat(0.0); 3] };
+    let mut sum = load(isa, of(node));
+    for node in rest {
+        sum = plus(isa, sum, load(isa, of(node)));
+    }
+    sum
+}
