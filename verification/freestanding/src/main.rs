@@ -51,7 +51,9 @@ impl Waiting for Awake {
 fn all() -> bool {
     for broad_phase in [BroadPhase::Spatial, BroadPhase::Pairwise] {
         for entry in [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap] {
-            if pipeline(black_box(Config { broad_phase, entry, tokens: 2, homes: HOMES as u32 })) != Ok(()) {
+            if pipeline(black_box(Config { broad_phase, entry, tokens: 2, homes: HOMES as u32 }))
+                != Ok(())
+            {
                 return false;
             }
         }
