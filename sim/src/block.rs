@@ -88,11 +88,11 @@ pub(crate) struct Gathered {
 }
 
 impl Gathered {
-    /// Makes room for what these objects usually have.
-    pub(crate) fn reserve(&mut self, objects: &[Object]) {
-        self.records.reserve(objects.len() * CONTACTS_PER_OBJECT);
-        self.segments.reserve(objects.len() * TOUCHED_PER_OBJECT);
-        self.workspace.reserve(objects);
+    /// Makes room for what so many objects like these usually have.
+    pub(crate) fn reserve(&mut self, objects: &[Object], room: usize) {
+        self.records.reserve(room * CONTACTS_PER_OBJECT);
+        self.segments.reserve(room * TOUCHED_PER_OBJECT);
+        self.workspace.reserve(objects, room);
     }
 
     pub(crate) fn clear(&mut self) {

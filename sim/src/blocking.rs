@@ -62,6 +62,8 @@ pub struct Blocking {
     members: Vec<Members>,
     keys: Vec<Key>,
     moving_blocks: usize,
+    /// Room for objects in every block of moving ones: which of them has one more changes.
+    room: usize,
 }
 
 /// Who is in a block.
@@ -150,7 +152,11 @@ impl Blocking {
         let mut blocks = Vec::new();
         blocks.resize_with(members.len(), Block::default);
         let keys = Vec::with_capacity(moving.len());
-        let mut blocking = Self { objects, members, keys, moving_blocks };
+        let room = moving.len().div_ceil(moving_blocks.max(1)) + 1;
+        for members in &mut members[..moving_blocks] {
+            members.ids.reserve(room);
+        }
+        let mut blocking = Self { objects, members, keys, moving_blocks, room };
         blocking.split();
         for (index, block) in blocks.iter_mut().enumerate() {
             blocking.fill(index, block);
@@ -204,11 +210,12 @@ impl Blocking {
     /// Puts the objects of the block number `index` into it.
     pub fn fill(&mut self, index: usize, block: &mut Block) {
         let Some(Members { ids, .. }) = self.members.get(index) else { return };
-        block.objects.reserve(ids.len());
+        let room = ids.len().max(self.room);
+        block.objects.reserve(room);
         for &id in ids {
             block.objects.extend(self.objects.get_mut(id as usize).and_then(Option::take));
         }
-        block.gathered.reserve(&block.objects);
+        block.gathered.reserve(&block.objects, room);
         block.refresh();
     }
 }

@@ -89,8 +89,8 @@ pub(crate) struct Workspace {
 
 impl Workspace {
     /// Makes room for these objects, so that no frame need allocate.
-    pub(crate) fn reserve(&mut self, objects: &[Object]) {
-        self.waiting.reserve(objects.len());
+    pub(crate) fn reserve(&mut self, objects: &[Object], room: usize) {
+        self.waiting.reserve(room);
         let meshes = objects.iter().filter_map(|object| object.geometry.as_mesh());
         let Some(nodes) = meshes.map(|mesh| mesh.topology().nodes()).max() else { return };
         self.alone.reserve(nodes);
