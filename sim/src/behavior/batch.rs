@@ -27,6 +27,18 @@ thread_local! {
     static NODES: RefCell<Nodes> = RefCell::default();
 }
 
+/// The nodes of the largest of these objects that may be advanced with others.
+pub(crate) fn most_nodes<'o>(objects: impl Iterator<Item = &'o Object>) -> usize {
+    let meshes = objects.filter_map(|object| object.geometry.as_mesh());
+    let nodes = meshes.map(|mesh| mesh.topology().nodes());
+    nodes.filter(|&nodes| nodes <= MOST_NODES).max().unwrap_or(0)
+}
+
+/// Makes room on this thread for bodies of so many nodes, so that its first block need not allocate.
+pub(crate) fn reserve(nodes: usize) {
+    NODES.with_borrow_mut(|own| own.reserve(nodes));
+}
+
 /// A body whose springs are left to be advanced.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Waiting {

@@ -44,7 +44,7 @@ pub(in super::super) struct Nodes {
 
 impl Nodes {
     /// Makes room for bodies of so many nodes.
-    pub(super) fn reserve(&mut self, nodes: usize) {
+    pub(in crate::behavior) fn reserve(&mut self, nodes: usize) {
         let room = nodes.next_multiple_of(LANES);
         for set in &mut self.sets {
             set.resize(set.len().max(room), Node::default());

@@ -11,6 +11,7 @@ use dualframe_core::frame::Frame;
 use dualframe_core::inputs::Inputs;
 use dualframe_core::unit::UnitId;
 
+use crate::behavior::batch;
 use crate::block::Block;
 use crate::executor::FrameRecord;
 use crate::executor::world::RECORDS_PER_CANDIDATE;
@@ -25,14 +26,17 @@ pub(super) struct Shared<'s> {
     pub(super) stages: &'s Stages,
     /// The number of the pipeline's frame 0.
     pub(super) first_frame: u64,
+    /// The most nodes of a body that workers make room for.
+    nodes: usize,
     /// The unit that each object is in. Changed only between runs.
     unit_of: Vec<AtomicU32>,
 }
 
 impl<'s> Shared<'s> {
-    pub(super) fn new(stages: &'s Stages, first_frame: u64, objects: usize) -> Self {
-        let unit_of = (0..objects).map(|_| AtomicU32::new(0)).collect();
-        Self { stages, first_frame, unit_of }
+    pub(super) fn new(stages: &'s Stages, first_frame: u64, blocks: &[Block]) -> Self {
+        let objects = || blocks.iter().flat_map(Block::objects);
+        let unit_of = objects().map(|_| AtomicU32::new(0)).collect();
+        Self { stages, first_frame, nodes: batch::most_nodes(objects()), unit_of }
     }
 
     /// Notes that the objects of `block` are in unit `unit`.
@@ -86,6 +90,7 @@ pub(super) struct Host<'s> {
 
 impl<'s> Host<'s> {
     pub(super) fn new(shared: &'s Shared<'s>) -> Self {
+        batch::reserve(shared.nodes);
         let results = RefCell::new(ContactBuffer::with_capacity(RECORDS_PER_CANDIDATE));
         Self { shared, scratch: RefCell::default(), results, letters: RefCell::default() }
     }

@@ -40,7 +40,6 @@ pub struct PipelineExecutor {
     grain: Grain,
     pool: Arc<Pool>,
     frame: u64,
-    objects: usize,
     /// Messages for the next frame.
     mail: Vec<(From, Parcel)>,
     seconds: Vec<StageSeconds>,
@@ -59,7 +58,6 @@ impl PipelineExecutor {
         pool: Arc<Pool>,
     ) -> Result<Self, ExecutorError> {
         let Scene { objects, stages } = scene;
-        let count = objects.len();
         let (blocking, blocks) = Blocking::new(objects, grain, pool.threads())?;
         let (broad_phase, interactions) = match grain {
             Grain::Spatial => (BroadPhase::Spatial, spare_interactions(blocks.len())),
@@ -75,7 +73,6 @@ impl PipelineExecutor {
             grain,
             pool,
             frame: 0,
-            objects: count,
             mail: Vec::new(),
             seconds: Vec::new(),
             failure: None,
@@ -90,7 +87,7 @@ impl PipelineExecutor {
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<u64, ExecutorError> {
         let most_contacts = self.tables.contact_capacity() / 2;
-        let shared = Shared::new(&self.stages, self.frame, self.objects);
+        let shared = Shared::new(&self.stages, self.frame, &self.blocks);
         self.tables.load(&mut self.blocks);
         self.tables.reserve_letters(self.mail.len());
         let crew = Crew::default();
