@@ -142,8 +142,10 @@ impl Blocking {
                 block_count(solitary.len(), workers),
             ),
         };
+        let room = moving.len().div_ceil(moving_blocks.max(1)) + 1;
+        let empty = || Members { ids: Vec::with_capacity(room), ..Members::default() };
         let mut members = Vec::new();
-        members.resize_with(moving_blocks, Members::default);
+        members.resize_with(moving_blocks, empty);
         for (ids, blocks) in [(scenery, scenery_blocks), (solitary, solitary_blocks)] {
             let size = ids.len().div_ceil(blocks.max(1)).max(1);
             let chunks = ids.chunks(size);
@@ -152,10 +154,6 @@ impl Blocking {
         let mut blocks = Vec::new();
         blocks.resize_with(members.len(), Block::default);
         let keys = Vec::with_capacity(moving.len());
-        let room = moving.len().div_ceil(moving_blocks.max(1)) + 1;
-        for members in &mut members[..moving_blocks] {
-            members.ids.reserve(room);
-        }
         let mut blocking = Self { objects, members, keys, moving_blocks, room };
         blocking.split();
         for (index, block) in blocks.iter_mut().enumerate() {
