@@ -110,7 +110,7 @@ impl Room {
     ) -> (Range<u32>, Result<(), TableFull>) {
         let mut start = self.used();
         loop {
-            let taken = count.min(capacity - start);
+            let taken = count.min(capacity.saturating_sub(start));
             match self.used.exchange(start, start + taken, site::POOL_CLAIM) {
                 Ok(_) if taken == count => return (start..start + taken, Ok(())),
                 Ok(_) => {

@@ -68,7 +68,7 @@ faults! {
     PoolsResetEarly;
     /// Trap 6: a push takes its place first and fills it later.
     TicketPush;
-    /// Trap 7: announcements are batched, and a worker goes idle with one unsent.
+    /// Trap 7: announcements are batched by threes, and a worker goes idle with some unsent.
     BatchNotFlushed;
     /// Trap 8: a holder does what it carries before it renders what waits.
     CarriedBeforeRendering;

@@ -5,11 +5,11 @@
 //!
 //! The core does not allocate, lock, call the system, print or panic; all memory is the host's
 //! (`verification/freestanding` is a program that links only if nothing in the core can panic or
-//! allocate, built with overflow checks off, as releases are). One [`worker::Worker::step`] does at most one work unit: its own cost is a bounded
-//! number of atomic operations (`PROTOCOL.md` §8), except that a compare-and-swap is retried when
-//! another worker succeeded at the same word meanwhile. A worker that is suspended anywhere holds
-//! back only the work unit in its hand. A full table is a returned error that names the capacity
-//! needed. Waiting is the host's ([`wait::Waiting`]).
+//! allocate, built with overflow checks off, as releases are). One [`worker::Worker::step`] does at
+//! most one work unit: its own cost is a bounded number of atomic operations (`PROTOCOL.md` §8), except
+//! that a compare-and-swap is retried when another worker succeeded at the same word meanwhile. A worker
+//! that is suspended anywhere holds back only the work unit in its hand. A full table is a returned
+//! error that names the capacity needed. Waiting is the host's ([`wait::Waiting`]).
 //!
 //! # One idea
 //!

@@ -63,6 +63,7 @@ impl PipelineExecutor {
             Grain::Spatial => (BroadPhase::Spatial, spare_interactions(blocks.len())),
             Grain::Pairwise => (BroadPhase::Pairwise, modelled_interactions(&stages, &blocks)),
         };
+        // As many as there are threads now; whoever joins later shares one.
         let homes = pool.threads().min(MOST_HOMES);
         Ok(Self {
             tables: Tables::new(&blocks, interactions, homes),
