@@ -68,6 +68,12 @@ impl View {
         self.frustum.may_see(&bounds.union(&shadow))
     }
 
+    /// This frame's numbers with another projection, as bytes.
+    pub(crate) fn numbers_seen_by(&self, view_projection: Mat4) -> Vec<u8> {
+        let numbers = Self { view_projection, ..*self }.numbers();
+        bytemuck::bytes_of(&numbers).to_vec()
+    }
+
     fn numbers(&self) -> Numbers {
         let Look { focus, room, coloring, quality, .. } = self.look;
         Numbers {
@@ -124,10 +130,13 @@ pub(crate) struct Globals {
 }
 
 impl Globals {
+    /// The numbers' size, in bytes.
+    pub(crate) const SIZE: u64 = size_of::<Numbers>() as u64;
+
     pub(crate) fn new(device: &Device, layouts: &Layouts, quality: Quality) -> Self {
         let buffer = device.create_buffer(&BufferDescriptor {
             label: Some("globals"),
-            size: size_of::<Numbers>() as u64,
+            size: Self::SIZE,
             usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });

@@ -8,11 +8,13 @@ use wgpu::{
     TextureUsages, TextureView,
 };
 
+use crate::auxiliary::{Auxiliary, Context, Units};
 use crate::camera::Camera;
 use crate::error::GraphicsError;
 use crate::globals::{Globals, View};
 use crate::gpu::Gpu;
 use crate::look::Look;
+use crate::pick::Picker;
 use crate::picture::{Picture, Readback};
 use crate::room::Room;
 use crate::surface::{Layouts, Surfaces};
@@ -34,6 +36,8 @@ pub struct Painter {
     globals: Globals,
     surfaces: Surfaces,
     room: Room,
+    picker: Picker,
+    units: Units,
     format: Format,
     target: Target,
     /// The frame being drawn, from its first object on.
@@ -60,6 +64,8 @@ impl Painter {
             globals: Globals::new(device, &layouts, look.quality),
             surfaces: Surfaces::new(device, &layouts, format),
             room: Room::new(device, &layouts, format),
+            picker: Picker::new(device, &layouts, Globals::SIZE),
+            units: Units::new(),
             target: Target::new(device, format, size.0, size.1),
             camera: Camera::around(&look.focus),
             layouts,
@@ -75,6 +81,12 @@ impl Painter {
     #[must_use]
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
+    }
+
+    /// Where GPU work besides drawing is submitted.
+    #[must_use]
+    pub fn auxiliary(&self) -> Auxiliary {
+        self.units.queue()
     }
 
     /// Draws at another size from the next frame on.
@@ -158,6 +170,12 @@ impl Painter {
             self.room.paint(&mut pass, &self.globals.lit);
         }
         self.surfaces.paint(&mut pass, &self.globals.lit);
+        drop(pass);
+        let Self { gpu, surfaces, picker, units, .. } = self;
+        let size = (self.target.width, self.target.height);
+        let context = Context { gpu, view: &view, size, surfaces, picker };
+        units.finish(&context);
+        units.encode(&context, encoder);
     }
 }
 
