@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::object::Object;
+use crate::object::{Object, ObjectId};
 
 /// Something told to an object. It is processed immediately before the object's next update; what is
 /// posted in frame f's updates is processed in frame f+1's, ordered by sender and then by the order
@@ -30,6 +30,19 @@ pub enum Message {
     Remove,
     /// A message of the application's own making.
     Custom(Box<dyn Custom>),
+}
+
+/// A message under way.
+#[derive(Debug)]
+pub struct Letter {
+    /// The frame in whose update it is to be processed.
+    pub due: u64,
+    /// Whom it is for.
+    pub to: ObjectId,
+    /// Who sent it; [`ObjectId::HOST`] if it came from outside.
+    pub from: ObjectId,
+    /// What it says.
+    pub message: Message,
 }
 
 /// A message of the application's own making: the paper's base class with its *processMessage*
