@@ -37,6 +37,7 @@ fn pushed() -> Scene {
         let act = move |_: &mut Geometry, input: &mut Input<'_>| {
             let to = (u64::from(id) * 7 + input.frame) % u64::from(PARTICLES);
             input.post(ObjectId(to as u32), push(input.frame, 1e-3 * id as f32));
+            input.post(ObjectId(1_000), Message::Remove);
         };
         scene.objects.push(point(id, Acting(act)).solitary());
     }

@@ -1,6 +1,6 @@
 //! Executors: what drives the four stages, frame by frame.
 //!
-//! Every executor calls the same [`Stages`](crate::stages::Stages) on the same
+//! Every executor calls the same [`Stages`] on the same
 //! [`Block`](crate::block::Block)s and comes to the same bits.
 
 mod barrier;
