@@ -15,7 +15,7 @@
 //! | Object Manager: maintains the objects and where they go | [`blocking`], [`block`] |
 //! | Object Interaction Manager: the complete set of interaction pairs | [`interaction::Rules`]; the queues are the core's |
 //! | thread pool | [`pool`] |
-//! | §6.2: messages | [`message`] |
+//! | §6.2: messages | [`message`]; from outside: [`mailbox`] |
 //! | §7.1.1: particles | [`scene`] |
 //! | §7.2: the pipeline and what it is compared with | [`executor`] |
 //! | §7–§8: Eqs. 2–4, Figs. 11–17, Table 1 | `experiment`, with the feature of that name |
@@ -31,6 +31,7 @@ pub mod executor;
 pub mod experiment;
 pub mod geometry;
 pub mod interaction;
+pub mod mailbox;
 pub mod manager;
 pub mod message;
 pub mod object;

@@ -18,7 +18,6 @@ use crate::stages::PairCount;
 /// An environment that is computed loop by loop.
 pub(super) struct Engine {
     pub(super) world: World,
-    pub(super) mail: Mail,
     pub(super) workers: Vec<Worker>,
     pub(super) frame: u64,
     bounds: Vec<Bounds>,
@@ -74,12 +73,12 @@ pub(super) fn check_threads(threads: usize) -> Result<(), ExecutorError> {
 impl Engine {
     pub(super) fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
         check_threads(threads)?;
+        let frame = scene.frame;
         let world = World::new(scene, grain, threads)?;
         let blocks = world.blocks.len();
         Ok(Self {
-            mail: Mail::new(),
             workers: (0..threads).map(|_| Worker::new(blocks)).collect(),
-            frame: 0,
+            frame,
             bounds: Vec::with_capacity(blocks),
             found: (0..blocks).map(|_| world::found_list()).collect(),
             candidates: Candidates::new(blocks),
@@ -97,7 +96,7 @@ impl Engine {
         if self.world.regroups_before(self.frame) {
             self.world.regroup();
         }
-        self.mail.turn();
+        self.world.mail.turn();
         self.broad_phase(loops);
         let pairs = self.interact(loops);
         self.update(loops, updated);
@@ -144,18 +143,23 @@ impl Engine {
     }
 
     fn update(&mut self, loops: &impl ParallelFor, updated: impl Fn(usize, &Block) + Sync + Send) {
-        let World { stages, blocks, .. } = &mut self.world;
+        let World { stages, blocks, mail, outside, .. } = &mut self.world;
         let (candidates, outcomes, workers) = (&self.candidates, &self.outcomes, &self.workers);
-        let (frame, mail) = (self.frame, &self.mail);
+        let (frame, from_outside) = (self.frame, outside.due(self.frame));
+        let letters = |object| mail.to(object).chain(from_outside.to(object));
         let begin = |worker: usize| workers[worker].begin_update();
         loops.for_each(blocks, begin, |(_timer, outbox), index, block| {
             let outcomes = candidates.of_block(index).map(|place| &outcomes[place]);
             outcomes.flat_map(Outcome::segments).for_each(|segment| block.receive(segment));
             let mut post = |from, to, message| outbox.push((from, to, message));
-            stages.update(frame, block, mail.letters(), &mut post);
+            stages.update(frame, block, letters, &mut post);
             updated(index, block);
         });
-        Worker::collect(&self.workers, &mut self.mail);
+        Worker::collect(&self.workers, mail);
+    }
+
+    pub(super) fn into_scene(self) -> Scene {
+        self.world.into_scene(self.frame)
     }
 
     pub(super) fn stage_seconds(&self, running: Duration) -> Vec<StageSeconds> {

@@ -150,7 +150,7 @@ impl ParticleScene {
             callback_budget: None,
             simd: Simd::detect(),
         };
-        Ok(Scene { objects, stages })
+        Ok(Scene::new(objects, stages))
     }
 
     fn particles(&self, centers: &[Vec3]) -> Result<Vec<Object>, SceneError> {

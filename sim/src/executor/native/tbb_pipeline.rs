@@ -6,7 +6,6 @@ use send_wrapper::SendWrapper;
 
 use super::super::clock::{Stage, StageSeconds};
 use super::super::engine::{Worker, check_threads};
-use super::super::mail::Mail;
 use super::super::parallel_for::ParallelFor;
 use super::super::world::{self, Candidates, Outcome, World};
 use super::super::{Executor, ExecutorError, FrameRecord};
@@ -14,11 +13,11 @@ use super::shim::Tbb;
 use crate::block::Block;
 use crate::blocking::Grain;
 use crate::geometry::Bounds;
-use crate::message::Message;
-use crate::object::{Object, ObjectId};
+use crate::mailbox::Mailbox;
+use crate::object::Object;
 use crate::render::Renderer;
 use crate::scene::Scene;
-use crate::stages::PairCount;
+use crate::stages::{PairCount, Stages};
 
 /// Two oneTBB pipelines a frame: blocks are searched for partners and interact with them, in
 /// parallel, and what that gave is listed in order; then blocks are updated, in parallel, and rendered
@@ -34,7 +33,6 @@ use crate::stages::PairCount;
 pub struct TbbPipelineExecutor {
     world: World,
     arena: Tbb,
-    mail: Mail,
     workers: Vec<Worker>,
     bounds: Vec<Bounds>,
     searches: Vec<Search>,
@@ -58,18 +56,18 @@ impl TbbPipelineExecutor {
     /// No or too many threads, or objects that cannot be grouped.
     pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
         check_threads(threads)?;
+        let frame = scene.frame;
         let world = World::new(scene, grain, threads)?;
         let blocks = world.blocks.len();
         Ok(Self {
             arena: Tbb::new(threads)?,
-            mail: Mail::new(),
             workers: (0..threads).map(|_| Worker::new(blocks)).collect(),
             bounds: Vec::with_capacity(blocks),
             searches: (0..blocks).map(|_| Search::new()).collect(),
             candidates: Candidates::new(blocks),
             first_places: Vec::with_capacity(blocks),
             running: Duration::ZERO,
-            frame: 0,
+            frame,
             world,
         })
     }
@@ -78,7 +76,7 @@ impl TbbPipelineExecutor {
         if self.world.regroups_before(self.frame) {
             self.world.regroup();
         }
-        self.mail.turn();
+        self.world.mail.turn();
         self.bounds.clear();
         self.bounds.extend(self.world.blocks.iter().map(Block::bounds));
     }
@@ -103,8 +101,10 @@ impl TbbPipelineExecutor {
 
     /// The second pipeline.
     fn update(&mut self, renderer: &mut dyn Renderer) {
-        let Self { searches, workers, candidates, first_places, frame, mail, .. } = self;
-        let World { stages, blocks, .. } = &mut self.world;
+        let Self { searches, workers, candidates, first_places, frame, .. } = self;
+        let World { stages, blocks, mail, outside, .. } = &mut self.world;
+        let from_outside = outside.due(*frame);
+        let letters = |object| mail.to(object).chain(from_outside.to(object));
         let outcome = |place: usize| {
             let first = candidates.pairs[place][0] as usize;
             &searches[first].outcomes[place - first_places[first]]
@@ -114,7 +114,7 @@ impl TbbPipelineExecutor {
             let segments = candidates.of_block(index).map(outcome).flat_map(Outcome::segments);
             segments.for_each(|segment| block.receive(segment));
             let mut post = |from, to, message| outbox.push((from, to, message));
-            stages.update(*frame, block, mail.letters(), &mut post);
+            stages.update(*frame, block, letters, &mut post);
         };
         let mut waiting: Vec<&Block> = Vec::with_capacity(blocks.len());
         let mut screen = SendWrapper::new(renderer);
@@ -172,11 +172,13 @@ impl Executor for TbbPipelineExecutor {
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<(), ExecutorError> {
         let began = Instant::now();
+        self.world.outside.begin(self.frame);
         for _ in 0..frames {
             self.prepare();
             let pairs = self.interact();
             self.update(renderer);
             on_frame(&FrameRecord { frame: self.frame, swapped: Instant::now(), pairs });
+            self.world.outside.swapped(self.frame);
             self.frame += 1;
         }
         self.running += began.elapsed();
@@ -191,8 +193,16 @@ impl Executor for TbbPipelineExecutor {
         world::visit(&self.world.blocks, visit);
     }
 
-    fn post(&mut self, to: ObjectId, message: Message) {
-        self.mail.collect(ObjectId::HOST, to, message);
+    fn mailbox(&self) -> &Mailbox {
+        self.world.outside.mailbox()
+    }
+
+    fn change(&mut self, change: &mut dyn FnMut(&mut Stages)) {
+        self.world.change(change);
+    }
+
+    fn into_scene(self: Box<Self>) -> Scene {
+        self.world.into_scene(self.frame)
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {

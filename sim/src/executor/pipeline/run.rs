@@ -28,7 +28,7 @@ pub(super) struct Report {
 pub(super) struct Regrouping<'x> {
     /// What forms blocks anew, where there are any.
     pub(super) blocking: Option<&'x mut Blocking>,
-    /// Messages for the next frame.
+    /// Objects' messages for the next frame.
     pub(super) mail: &'x mut Vec<(From, Parcel)>,
     pub(super) homes: u32,
     /// Contact records of a frame beyond which the tables are to grow.
