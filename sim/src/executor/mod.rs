@@ -17,6 +17,7 @@ mod serial;
 mod static_;
 mod world;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use thiserror::Error;
@@ -26,6 +27,7 @@ use crate::message::Message;
 use crate::object::{Object, ObjectId};
 use crate::render::Renderer;
 use crate::stages::PairCount;
+use crate::timeline::Timeline;
 
 pub use self::rayon::{RayonExecutor, RayonLoops};
 pub use clock::{Stage, StageSeconds};
@@ -172,6 +174,12 @@ pub trait Executor {
     /// Posts a message from outside, which is processed in the next frame after all messages that
     /// objects sent.
     fn post(&mut self, to: ObjectId, message: Message);
+
+    /// Records on `timeline`, from the next frame on, what each worker does. Workers have the numbers
+    /// that they have in [`Executor::stage_seconds`]; only the calling thread of
+    /// [`RayonOverlappedExecutor`], which renders beside the workers, comes after them as one more. An
+    /// executor has one timeline for life, the first that it is given.
+    fn watch(&mut self, timeline: Arc<Timeline>);
 
     /// What each worker spent its time on since the executor was built.
     fn stage_seconds(&self) -> Vec<StageSeconds>;

@@ -1,5 +1,6 @@
 //! One thread, stage after stage.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::clock::{Clock, Stage, StageSeconds};
@@ -15,6 +16,7 @@ use crate::object::{Object, ObjectId};
 use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::stages::PairCount;
+use crate::timeline::Timeline;
 
 /// One thread, stage after stage: no locks, no queues, nothing of the pipeline.
 pub struct SerialExecutor {
@@ -55,7 +57,7 @@ impl SerialExecutor {
     }
 
     fn broad_phase(&mut self) {
-        let _timer = self.clock.time(Stage::BroadPhase);
+        let _timer = self.clock.time(Stage::BroadPhase, self.frame);
         let World { stages, blocks, partners, .. } = &self.world;
         self.bounds.clear();
         self.bounds.extend(blocks.iter().map(Block::bounds));
@@ -71,7 +73,7 @@ impl SerialExecutor {
     }
 
     fn interact(&mut self) -> PairCount {
-        let _timer = self.clock.time(Stage::Interaction);
+        let _timer = self.clock.time(Stage::Interaction, self.frame);
         let pairs = &self.candidates.pairs;
         if self.outcomes.len() < pairs.len() {
             self.outcomes.resize_with(pairs.len(), Outcome::new);
@@ -86,7 +88,7 @@ impl SerialExecutor {
     }
 
     fn update(&mut self) {
-        let _timer = self.clock.time(Stage::Update);
+        let _timer = self.clock.time(Stage::Update, self.frame);
         let World { stages, blocks, .. } = &mut self.world;
         for (index, block) in blocks.iter_mut().enumerate() {
             let outcomes = self.candidates.of_block(index).map(|place| &self.outcomes[place]);
@@ -98,7 +100,7 @@ impl SerialExecutor {
     }
 
     fn render(&mut self, renderer: &mut dyn Renderer) {
-        let _timer = self.clock.time(Stage::Render);
+        let _timer = self.clock.time(Stage::Render, self.frame);
         for block in &self.world.blocks {
             self.world.stages.render(block, renderer);
         }
@@ -140,6 +142,10 @@ impl Executor for SerialExecutor {
 
     fn post(&mut self, to: ObjectId, message: Message) {
         self.mail.collect(ObjectId::HOST, to, message);
+    }
+
+    fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.clock.watch(timeline, 0);
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {

@@ -28,6 +28,7 @@ use crate::pool::{Crew, Pool};
 use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::stages::{PairCount, Stages};
+use crate::timeline::Timeline;
 
 /// Advances an environment by the pipeline. The calling thread is worker number 0 and holds the
 /// render token.
@@ -43,6 +44,7 @@ pub struct PipelineExecutor {
     /// Messages for the next frame.
     mail: Vec<(From, Parcel)>,
     seconds: Vec<StageSeconds>,
+    timeline: Option<Arc<Timeline>>,
     failure: Option<TableFull>,
 }
 
@@ -76,6 +78,7 @@ impl PipelineExecutor {
             frame: 0,
             mail: Vec::new(),
             seconds: Vec::new(),
+            timeline: None,
             failure: None,
         })
     }
@@ -95,7 +98,13 @@ impl PipelineExecutor {
         let pipeline = Pipeline::new(self.tables.lend(), self.config, &crew)?;
         let seconds = std::mem::take(&mut self.seconds);
         let report = Mutex::new(Report { seconds, failure: None });
-        let context = Context { shared: &shared, crew: &crew, pool: &self.pool, report: &report };
+        let context = Context {
+            shared: &shared,
+            crew: &crew,
+            pool: &self.pool,
+            report: &report,
+            timeline: self.timeline.as_deref(),
+        };
         let regrouping = Regrouping {
             blocking: (self.grain == Grain::Spatial).then_some(&mut self.blocking),
             mail: &mut self.mail,
@@ -148,6 +157,10 @@ impl Executor for PipelineExecutor {
     fn post(&mut self, to: ObjectId, message: Message) {
         let from = From { sender: ObjectId::HOST.0, sequence: self.mail.len() as u32 };
         self.mail.push((from, Parcel { to, message }));
+    }
+
+    fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.timeline.get_or_insert(timeline);
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {
