@@ -19,6 +19,7 @@
 //! | §7.1.1: particles | [`scene`] |
 //! | §7.2: the pipeline and what it is compared with | [`executor`] |
 //! | §7–§8: Eqs. 2–4, Figs. 11–17, Table 1 | `experiment`, with the feature of that name |
+//! | (not in the paper) what each worker did when | [`timeline`] |
 //! | (not in the paper) kernels in vector instructions | [`simd`] |
 
 #![deny(unsafe_code)]
@@ -42,3 +43,4 @@ pub mod scene;
 pub mod simd;
 pub mod stages;
 pub mod state;
+pub mod timeline;

@@ -18,6 +18,7 @@ use crate::pool::{Pool, cores};
 use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::stages::Stages;
+use crate::timeline::Timeline;
 
 /// How an environment is to be run. No setting changes a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,6 +150,11 @@ impl VeManager {
     #[must_use]
     pub fn state_hash(&self) -> u64 {
         state_hash(&*self.executor)
+    }
+
+    /// Records on a timeline what workers do; see [`Executor::watch`].
+    pub fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.executor.watch(timeline);
     }
 
     /// What each worker spent its time on.

@@ -1,6 +1,6 @@
 //! The stages up to update as parallel loops.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::clock::{Clock, Stage, StageSeconds, Timer};
@@ -14,6 +14,7 @@ use crate::geometry::Bounds;
 use crate::interaction::Scratch;
 use crate::scene::Scene;
 use crate::stages::PairCount;
+use crate::timeline::Timeline;
 
 /// An environment that is computed loop by loop.
 pub(super) struct Engine {
@@ -41,13 +42,13 @@ impl Worker {
     }
 
     /// What interactions need, and their time.
-    pub(super) fn begin_interaction(&self) -> (Timer<'_>, MutexGuard<'_, Scratch>) {
-        (self.clock.time(Stage::Interaction), lock(&self.scratch))
+    pub(super) fn begin_interaction(&self, frame: u64) -> (Timer<'_>, MutexGuard<'_, Scratch>) {
+        (self.clock.time(Stage::Interaction, frame), lock(&self.scratch))
     }
 
     /// What updates need, and their time.
-    pub(super) fn begin_update(&self) -> (Timer<'_>, MutexGuard<'_, Outbox>) {
-        (self.clock.time(Stage::Update), lock(&self.outbox))
+    pub(super) fn begin_update(&self, frame: u64) -> (Timer<'_>, MutexGuard<'_, Outbox>) {
+        (self.clock.time(Stage::Update, frame), lock(&self.outbox))
     }
 
     /// Moves what was sent to the next frame's mail.
@@ -108,8 +109,8 @@ impl Engine {
         let World { stages, blocks, partners, .. } = &self.world;
         self.bounds.clear();
         self.bounds.extend(blocks.iter().map(Block::bounds));
-        let (bounds, workers) = (&self.bounds, &self.workers);
-        let begin = |worker: usize| workers[worker].clock.time(Stage::BroadPhase);
+        let (bounds, workers, frame) = (&self.bounds, &self.workers, self.frame);
+        let begin = |worker: usize| workers[worker].clock.time(Stage::BroadPhase, frame);
         loops.for_each(&mut self.found, begin, |_timer, first, found| {
             let may_touch = |second: usize| {
                 let (first, second) = world::pair(blocks, [first as u32, second as u32]);
@@ -129,9 +130,9 @@ impl Engine {
         if self.outcomes.len() < pairs.len() {
             self.outcomes.resize_with(pairs.len(), Outcome::new);
         }
-        let workers = &self.workers;
+        let (workers, frame) = (&self.workers, self.frame);
         let outcomes = &mut self.outcomes[..pairs.len()];
-        let begin = |worker: usize| workers[worker].begin_interaction();
+        let begin = |worker: usize| workers[worker].begin_interaction(frame);
         loops.for_each(outcomes, begin, |(_timer, scratch), place, outcome| {
             let (first, second) = world::pair(blocks, pairs[place]);
             outcome.compute(stages, first, second, scratch);
@@ -147,7 +148,7 @@ impl Engine {
         let (candidates, outcomes, workers) = (&self.candidates, &self.outcomes, &self.workers);
         let (frame, from_outside) = (self.frame, outside.due(self.frame));
         let letters = |object| mail.to(object).chain(from_outside.to(object));
-        let begin = |worker: usize| workers[worker].begin_update();
+        let begin = |worker: usize| workers[worker].begin_update(frame);
         loops.for_each(blocks, begin, |(_timer, outbox), index, block| {
             let outcomes = candidates.of_block(index).map(|place| &outcomes[place]);
             outcomes.flat_map(Outcome::segments).for_each(|segment| block.receive(segment));
@@ -160,6 +161,12 @@ impl Engine {
 
     pub(super) fn into_scene(self) -> Scene {
         self.world.into_scene(self.frame)
+    }
+
+    pub(super) fn watch(&self, timeline: &Arc<Timeline>) {
+        for (index, worker) in self.workers.iter().enumerate() {
+            worker.clock.watch(Arc::clone(timeline), index);
+        }
     }
 
     pub(super) fn stage_seconds(&self, running: Duration) -> Vec<StageSeconds> {

@@ -18,6 +18,7 @@ mod serial;
 mod static_;
 mod world;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use thiserror::Error;
@@ -28,6 +29,7 @@ use crate::object::Object;
 use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::stages::{PairCount, Stages};
+use crate::timeline::Timeline;
 
 pub use self::rayon::{RayonExecutor, RayonLoops};
 pub use clock::{Stage, StageSeconds};
@@ -180,6 +182,12 @@ pub trait Executor {
     /// way: to go on by another executor, say, or with another object. After an error its state depends
     /// on the schedule.
     fn into_scene(self: Box<Self>) -> Scene;
+
+    /// Records on `timeline`, from the next frame on, what each worker does. Workers have the numbers
+    /// that they have in [`Executor::stage_seconds`]; only the calling thread of
+    /// [`RayonOverlappedExecutor`], which renders beside the workers, comes after them as one more. An
+    /// executor has one timeline for life, the first that it is given.
+    fn watch(&mut self, timeline: Arc<Timeline>);
 
     /// What each worker spent its time on since the executor was built.
     fn stage_seconds(&self) -> Vec<StageSeconds>;

@@ -1,5 +1,6 @@
 //! Stage after stage, each a parallel loop.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::clock::{Stage, StageSeconds};
@@ -11,6 +12,7 @@ use crate::object::Object;
 use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::stages::Stages;
+use crate::timeline::Timeline;
 
 /// Parallel loops on a fixed number of threads.
 pub trait ParallelFor: Sized + Sync {
@@ -71,7 +73,7 @@ impl<P: ParallelFor> Executor for LoopExecutor<P> {
             let frame = engine.frame;
             let pairs = loops.enter(|| engine.compute(loops, |_, _| ()));
             {
-                let _timer = self.engine.workers[0].clock.time(Stage::Render);
+                let _timer = self.engine.workers[0].clock.time(Stage::Render, frame);
                 for block in &self.engine.world.blocks {
                     self.engine.world.stages.render(block, renderer);
                 }
@@ -102,6 +104,10 @@ impl<P: ParallelFor> Executor for LoopExecutor<P> {
 
     fn into_scene(self: Box<Self>) -> Scene {
         self.engine.into_scene()
+    }
+
+    fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.engine.watch(&timeline);
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {

@@ -1,5 +1,6 @@
 //! One thread, stage after stage.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::clock::{Clock, Stage, StageSeconds};
@@ -14,6 +15,7 @@ use crate::object::Object;
 use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::stages::{PairCount, Stages};
+use crate::timeline::Timeline;
 
 /// One thread, stage after stage: no locks, no queues, nothing of the pipeline.
 pub struct SerialExecutor {
@@ -53,7 +55,7 @@ impl SerialExecutor {
     }
 
     fn broad_phase(&mut self) {
-        let _timer = self.clock.time(Stage::BroadPhase);
+        let _timer = self.clock.time(Stage::BroadPhase, self.frame);
         let World { stages, blocks, partners, .. } = &self.world;
         self.bounds.clear();
         self.bounds.extend(blocks.iter().map(Block::bounds));
@@ -69,7 +71,7 @@ impl SerialExecutor {
     }
 
     fn interact(&mut self) -> PairCount {
-        let _timer = self.clock.time(Stage::Interaction);
+        let _timer = self.clock.time(Stage::Interaction, self.frame);
         let pairs = &self.candidates.pairs;
         if self.outcomes.len() < pairs.len() {
             self.outcomes.resize_with(pairs.len(), Outcome::new);
@@ -84,7 +86,7 @@ impl SerialExecutor {
     }
 
     fn update(&mut self) {
-        let _timer = self.clock.time(Stage::Update);
+        let _timer = self.clock.time(Stage::Update, self.frame);
         let World { stages, blocks, mail, outside, .. } = &mut self.world;
         let from_outside = outside.due(self.frame);
         let letters = |object| mail.to(object).chain(from_outside.to(object));
@@ -98,7 +100,7 @@ impl SerialExecutor {
     }
 
     fn render(&mut self, renderer: &mut dyn Renderer) {
-        let _timer = self.clock.time(Stage::Render);
+        let _timer = self.clock.time(Stage::Render, self.frame);
         for block in &self.world.blocks {
             self.world.stages.render(block, renderer);
         }
@@ -150,6 +152,10 @@ impl Executor for SerialExecutor {
 
     fn into_scene(self: Box<Self>) -> Scene {
         self.world.into_scene(self.frame)
+    }
+
+    fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.clock.watch(timeline, 0);
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {

@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::barrier::Barrier;
-use super::clock::{Clock, Stage, StageSeconds};
+use super::clock::{Clock, Stage, StageSeconds, Timer};
 use super::engine::check_threads;
 use super::mail::Mail;
 use super::outside::Outside;
@@ -22,6 +22,7 @@ use crate::object::Object;
 use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::stages::{PairCount, Stages};
+use crate::timeline::Timeline;
 
 /// Long-lived threads, each with its equal share of blocks and of candidates, and a barrier after each
 /// stage. The calling thread is one of them, and renders while the others wait.
@@ -123,7 +124,7 @@ impl StaticExecutor {
     }
 
     fn render(&self, renderer: &mut dyn Renderer) {
-        let _timer = self.shared.clocks[0].time(Stage::Render);
+        let _timer = self.shared.clocks[0].time(Stage::Render, self.frame);
         let plan = read(&self.shared.plan);
         for block in &self.shared.blocks {
             plan.stages.render(&read(block), renderer);
@@ -179,7 +180,7 @@ impl Shared {
     }
 
     fn broad_phase(&self, worker: usize) {
-        let _timer = self.clocks[worker].time(Stage::BroadPhase);
+        let _timer = self.time(worker, Stage::BroadPhase);
         let plan = read(&self.plan);
         for first in self.share(worker, self.blocks.len()) {
             let own = read(&self.blocks[first]);
@@ -205,7 +206,7 @@ impl Shared {
     }
 
     fn interact(&self, worker: usize, scratch: &mut Scratch) {
-        let _timer = self.clocks[worker].time(Stage::Interaction);
+        let _timer = self.time(worker, Stage::Interaction);
         let plan = read(&self.plan);
         for place in self.share(worker, plan.candidates.pairs.len()) {
             let [first, second] = plan.candidates.pairs[place];
@@ -217,7 +218,7 @@ impl Shared {
     }
 
     fn update(&self, worker: usize) {
-        let _timer = self.clocks[worker].time(Stage::Update);
+        let _timer = self.time(worker, Stage::Update);
         let frame = self.frame.load(Ordering::Relaxed);
         let plan = read(&self.plan);
         let from_outside = self.outside.due(frame);
@@ -231,6 +232,10 @@ impl Shared {
             }
             plan.stages.update(frame, &mut block, letters, &mut post);
         }
+    }
+
+    fn time(&self, worker: usize, stage: Stage) -> Timer<'_> {
+        self.clocks[worker].time(stage, self.frame.load(Ordering::Relaxed))
     }
 
     /// A worker's part of so many items.
@@ -310,6 +315,12 @@ impl Executor for StaticExecutor {
         let blocks = blocks.map(|block| block.unwrap_or_else(PoisonError::into_inner));
         let objects = blocks.flat_map(|block| block.objects);
         world::scene(objects, stages, frame, mail.into_letters(frame), &outside)
+    }
+
+    fn watch(&mut self, timeline: Arc<Timeline>) {
+        for (index, clock) in self.shared.clocks.iter().enumerate() {
+            clock.watch(Arc::clone(&timeline), index);
+        }
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {

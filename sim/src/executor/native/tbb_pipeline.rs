@@ -1,5 +1,6 @@
 //! oneTBB's `parallel_pipeline`.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use send_wrapper::SendWrapper;
@@ -18,6 +19,7 @@ use crate::object::Object;
 use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::stages::{PairCount, Stages};
+use crate::timeline::Timeline;
 
 /// Two oneTBB pipelines a frame: blocks are searched for partners and interact with them, in
 /// parallel, and what that gave is listed in order; then blocks are updated, in parallel, and rendered
@@ -83,13 +85,13 @@ impl TbbPipelineExecutor {
 
     /// The first pipeline.
     fn interact(&mut self) -> PairCount {
-        let Self { world, workers, bounds, candidates, first_places, .. } = self;
+        let Self { world, workers, bounds, candidates, first_places, frame, .. } = self;
         let mut pairs = PairCount::default();
         candidates.clear();
         first_places.clear();
         self.arena.pipeline(
             &mut self.searches,
-            |worker, first, search| search.run(world, bounds, first, &workers[worker]),
+            |worker, first, search| search.run(world, bounds, first, &workers[worker], *frame),
             |_, first, search| {
                 first_places.push(candidates.pairs.len());
                 candidates.extend(first, &search.found);
@@ -110,7 +112,7 @@ impl TbbPipelineExecutor {
             &searches[first].outcomes[place - first_places[first]]
         };
         let work = |worker: usize, index: usize, block: &mut Block| {
-            let (_timer, mut outbox) = workers[worker].begin_update();
+            let (_timer, mut outbox) = workers[worker].begin_update(*frame);
             let segments = candidates.of_block(index).map(outcome).flat_map(Outcome::segments);
             segments.for_each(|segment| block.receive(segment));
             let mut post = |from, to, message| outbox.push((from, to, message));
@@ -121,11 +123,11 @@ impl TbbPipelineExecutor {
         self.arena.pipeline(blocks, work, |worker, _, block| {
             waiting.push(block);
             if screen.valid() {
-                let _timer = workers[worker].clock.time(Stage::Render);
+                let _timer = workers[worker].clock.time(Stage::Render, *frame);
                 waiting.drain(..).for_each(|block| stages.render(block, &mut **screen));
             }
         });
-        let _timer = workers[0].clock.time(Stage::Render);
+        let _timer = workers[0].clock.time(Stage::Render, *frame);
         waiting.drain(..).for_each(|block| stages.render(block, &mut **screen));
         screen.swap(*frame);
         Worker::collect(workers, mail);
@@ -139,10 +141,10 @@ impl Search {
     }
 
     /// Finds the partners of block `first`, and lets it interact with them.
-    fn run(&mut self, world: &World, bounds: &[Bounds], first: usize, worker: &Worker) {
+    fn run(&mut self, world: &World, bounds: &[Bounds], first: usize, worker: &Worker, frame: u64) {
         let World { stages, blocks, partners, .. } = world;
         let pair = |second: usize| world::pair(blocks, [first as u32, second as u32]);
-        let timer = worker.clock.time(Stage::BroadPhase);
+        let timer = worker.clock.time(Stage::BroadPhase, frame);
         let may_touch = |second| {
             let (first, second) = pair(second);
             world::may_touch(stages, first, second)
@@ -152,7 +154,7 @@ impl Search {
         if self.outcomes.len() < self.found.len() {
             self.outcomes.resize_with(self.found.len(), Outcome::new);
         }
-        let (_timer, mut scratch) = worker.begin_interaction();
+        let (_timer, mut scratch) = worker.begin_interaction(frame);
         for (&second, outcome) in self.found.iter().zip(&mut self.outcomes) {
             let (first, second) = pair(second as usize);
             outcome.compute(stages, first, second, &mut scratch);
@@ -203,6 +205,12 @@ impl Executor for TbbPipelineExecutor {
 
     fn into_scene(self: Box<Self>) -> Scene {
         self.world.into_scene(self.frame)
+    }
+
+    fn watch(&mut self, timeline: Arc<Timeline>) {
+        for (index, worker) in self.workers.iter().enumerate() {
+            worker.clock.watch(Arc::clone(&timeline), index);
+        }
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {

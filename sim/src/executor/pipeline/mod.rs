@@ -30,6 +30,7 @@ use crate::pool::{Crew, Pool};
 use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::stages::{PairCount, Stages};
+use crate::timeline::Timeline;
 
 /// Advances an environment by the pipeline. The calling thread is worker number 0 and holds the
 /// render token.
@@ -46,6 +47,7 @@ pub struct PipelineExecutor {
     mail: Vec<(From, Parcel)>,
     outside: Outside,
     seconds: Vec<StageSeconds>,
+    timeline: Option<Arc<Timeline>>,
     failure: Option<TableFull>,
 }
 
@@ -85,6 +87,7 @@ impl PipelineExecutor {
             mail,
             outside,
             seconds: Vec::new(),
+            timeline: None,
             failure: None,
         })
     }
@@ -103,7 +106,13 @@ impl PipelineExecutor {
         let pipeline = Pipeline::new(self.tables.lend(), self.config, &crew)?;
         let seconds = std::mem::take(&mut self.seconds);
         let report = Mutex::new(Report { seconds, failure: None });
-        let context = Context { shared: &shared, crew: &crew, pool: &self.pool, report: &report };
+        let context = Context {
+            shared: &shared,
+            crew: &crew,
+            pool: &self.pool,
+            report: &report,
+            timeline: self.timeline.as_deref(),
+        };
         let regrouping = Regrouping {
             blocking: (self.grain == Grain::Spatial).then_some(&mut self.blocking),
             mail: &mut self.mail,
@@ -176,6 +185,10 @@ impl Executor for PipelineExecutor {
         });
         let objects = self.blocks.into_iter().flat_map(|block| block.objects);
         world::scene(objects, self.stages, due, mail, &self.outside)
+    }
+
+    fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.timeline.get_or_insert(timeline);
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {
