@@ -227,7 +227,7 @@ impl Stages {
 }
 
 /// Draws an object, unless it is hidden or quarantined.
-pub(crate) fn draw(object: &Object, renderer: &mut dyn Renderer) {
+pub fn draw(object: &Object, renderer: &mut dyn Renderer) {
     if object.quarantined().is_none() && object.drawing != Drawing::Hidden {
         renderer.draw(object);
     }

@@ -1,0 +1,282 @@
+//! What the token's holder draws with: the window, its events and the pace.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use dualframe_render_wgpu::camera::Camera;
+use dualframe_render_wgpu::error::GraphicsError;
+use dualframe_render_wgpu::gpu::Gpu;
+use dualframe_render_wgpu::look::{Look, Quality};
+use dualframe_render_wgpu::renderer::Painter;
+use dualframe_sim::geometry::Bounds;
+use dualframe_sim::mailbox::Mailbox;
+use dualframe_sim::object::Object;
+use dualframe_sim::render::Renderer;
+use dualframe_sim::timeline::Timeline;
+use glam::Vec2;
+use wgpu::{Instance, InstanceDescriptor};
+use winit::event_loop::EventLoop;
+use winit::platform::pump_events::EventLoopExtPumpEvents;
+use winit::window::Window;
+
+use super::controls::Controls;
+use super::hand::Hand;
+use super::input::{Gesture, Input};
+use super::overlay::Overlay;
+use super::paint::OverlayPainter;
+use super::stats::Stats;
+use super::surface::{self, Screen};
+
+/// Pictures per second where the display does not say how many it shows.
+const USUAL_REFRESH: f64 = 60.0;
+/// How far simulated time may be behind the clock before it is no longer made up for.
+const MOST_LATE: Duration = Duration::from_millis(100);
+
+/// The window as a renderer.
+pub(super) struct View {
+    event_loop: EventLoop<()>,
+    input: Input,
+    window: Arc<Window>,
+    instance: Instance,
+    screen: Screen,
+    pub(super) painter: Painter,
+    overlay_painter: OverlayPainter,
+    overlay: Overlay,
+    hand: Hand,
+    home: Camera,
+    pub(super) controls: Controls,
+    pub(super) stats: Rc<RefCell<Stats>>,
+    pub(super) timeline: Arc<Timeline>,
+    pub(super) mailbox: Mailbox,
+    /// Whether the frame being drawn is shown. Displays show fewer frames than are computed.
+    is_shown: bool,
+    next_shown: Instant,
+    between_shown: Duration,
+    /// When the next frame is due, in real time.
+    due: Instant,
+    /// The time from one frame to the next.
+    time_step: Duration,
+    failure: Option<GraphicsError>,
+}
+
+/// What a window shows.
+pub(super) struct Shown {
+    pub(super) title: String,
+    pub(super) size: (u32, u32),
+    pub(super) focus: Bounds,
+    pub(super) time_step: Duration,
+    pub(super) timeline: Arc<Timeline>,
+}
+
+impl View {
+    /// Opens a window.
+    ///
+    /// # Errors
+    /// No display, no window, no adapter that can draw to it.
+    pub(super) fn open(
+        shown: Shown,
+        adapter: Option<&str>,
+        controls: Controls,
+    ) -> Result<Self, GraphicsError> {
+        let refused = |reason: String| GraphicsError::Surface { reason };
+        let mut event_loop = EventLoop::new().map_err(|_| GraphicsError::NoDisplay)?;
+        let mut input = Input::new(shown.title, shown.size);
+        event_loop.pump_app_events(Some(Duration::from_millis(100)), &mut input);
+        let window = match (input.window.clone(), input.failure.take()) {
+            (Some(window), _) => window,
+            (None, reason) => return Err(refused(reason.unwrap_or("it did not open".to_owned()))),
+        };
+        let display = Box::new(event_loop.owned_display_handle());
+        let instance = Instance::new(InstanceDescriptor::new_with_display_handle_from_env(display));
+        let surface = surface::create(&instance, &window)?;
+        let gpu = Gpu::for_surface(&instance, &surface, adapter)?;
+        let screen = Screen::new(&gpu, surface, Arc::clone(&window))?;
+        let overlay_painter = OverlayPainter::new(&gpu, screen.format());
+        input.egui = Some(overlay_painter.input(&gpu, &window));
+        let quality = if gpu.is_software() { Quality::Fast } else { Quality::Fine };
+        let look = Look::room(shown.focus, quality);
+        let painter = Painter::new(gpu, look, screen.format(), screen.size())?;
+        let refresh =
+            window.current_monitor().and_then(|monitor| monitor.refresh_rate_millihertz());
+        let refresh = refresh.map_or(USUAL_REFRESH, |rate| f64::from(rate.max(1_000)) * 1e-3);
+        let now = Instant::now();
+        Ok(Self {
+            event_loop,
+            input,
+            window,
+            instance,
+            screen,
+            home: painter.camera,
+            painter,
+            overlay_painter,
+            overlay: Overlay::new(),
+            hand: Hand::new(),
+            controls,
+            stats: Rc::new(RefCell::new(Stats::new())),
+            timeline: shown.timeline,
+            mailbox: Mailbox::new(),
+            is_shown: true,
+            next_shown: now,
+            between_shown: Duration::from_secs_f64(1.0 / refresh),
+            due: now,
+            time_step: shown.time_step,
+            failure: None,
+        })
+    }
+
+    /// Whether the window is to go.
+    pub(super) fn is_closing(&self) -> bool {
+        self.input.is_closing || self.failure().is_some()
+    }
+
+    /// Why nothing is drawn any more, if so.
+    pub(super) fn failure(&self) -> Option<GraphicsError> {
+        self.failure.clone().or_else(|| self.painter.failure())
+    }
+
+    /// Another environment is shown.
+    pub(super) fn turn_to(&mut self, focus: Bounds, mailbox: Mailbox) {
+        if self.painter.look.focus != focus {
+            self.painter.look.focus = focus;
+            self.painter.camera = Camera::around(&focus);
+            self.home = self.painter.camera;
+        }
+        self.mailbox = mailbox;
+        self.hand = Hand::new();
+    }
+
+    /// Does what the person did, after waiting for it for up to `timeout`; says whether anything may look
+    /// different now.
+    pub(super) fn attend(&mut self, timeout: Duration) -> bool {
+        self.event_loop.pump_app_events(Some(timeout), &mut self.input);
+        let mut gestures = std::mem::take(&mut self.input.gestures);
+        for gesture in gestures.drain(..) {
+            self.act(gesture);
+        }
+        // The list keeps its memory.
+        self.input.gestures = gestures;
+        let (point, aspect) = (self.point(), self.aspect());
+        self.hand.hold(&self.painter, &self.mailbox, point, aspect);
+        if self.screen.follow(self.painter.gpu()) {
+            let (width, height) = self.screen.size();
+            if let Err(error) = self.painter.resize(width, height) {
+                self.failure = Some(error);
+            }
+        }
+        self.painter.look.coloring = self.controls.coloring;
+        std::mem::take(&mut self.input.has_changed)
+    }
+
+    fn act(&mut self, gesture: Gesture) {
+        let Self { hand, painter, controls, .. } = self;
+        match gesture {
+            Gesture::Press => {
+                let point = self.point();
+                self.hand.press(&self.painter, point);
+            }
+            Gesture::Release => hand.release(&self.mailbox),
+            Gesture::Drag(button, by) => {
+                let height = painter.size().1 as f32;
+                hand.drag(painter, button, by / height);
+            }
+            Gesture::Wheel(lines) => hand.wheel(painter, lines),
+            Gesture::Pause => controls.is_paused = !controls.is_paused,
+            Gesture::Step => controls.steps += u64::from(controls.is_paused),
+            Gesture::ResetCamera => painter.camera = self.home,
+            Gesture::Overlay => controls.is_shown = !controls.is_shown,
+        }
+    }
+
+    /// Where the mouse is, from (−1, −1) at the lower left to (1, 1).
+    fn point(&self) -> Vec2 {
+        let (width, height) = self.painter.size();
+        let share = self.input.cursor / Vec2::new(width as f32, height as f32);
+        Vec2::new(2.0 * share.x - 1.0, 1.0 - 2.0 * share.y)
+    }
+
+    fn aspect(&self) -> f32 {
+        let (width, height) = self.painter.size();
+        width as f32 / height as f32
+    }
+
+    /// The next frame is shown, however soon after the last.
+    pub(super) fn show_next(&mut self) {
+        self.is_shown = true;
+        self.next_shown = Instant::now();
+    }
+
+    /// Time stood still: what was missed is not made up for.
+    pub(super) fn interrupt(&mut self) {
+        self.due = Instant::now();
+        self.stats.borrow_mut().interrupt();
+    }
+
+    /// Draws what was taken, and the overlay, and presents both.
+    fn present(&mut self) -> Result<(), GraphicsError> {
+        if !self.screen.is_visible() {
+            return Ok(());
+        }
+        let Some(texture) = self.screen.next(self.painter.gpu(), &self.instance)? else {
+            return Ok(());
+        };
+        let picture = texture.texture.create_view(&Default::default());
+        let mut encoder = self.painter.gpu().device.create_command_encoder(&Default::default());
+        self.painter.paint(&mut encoder, &picture);
+        let Self { painter, overlay_painter, overlay, input, controls, stats, timeline, .. } = self;
+        let gpu = painter.gpu();
+        let mut commands = match &mut input.egui {
+            Some(egui) => {
+                overlay_painter.paint(gpu, (&self.window, egui), (&mut encoder, &picture), |ui| {
+                    overlay.show(ui, controls, &stats.borrow(), timeline)
+                })
+            }
+            None => Vec::new(),
+        };
+        commands.push(encoder.finish());
+        gpu.queue.submit(commands);
+        self.window.pre_present_notify();
+        gpu.queue.present(texture);
+        Ok(())
+    }
+
+    /// Draws what was taken between two runs.
+    pub(super) fn redraw(&mut self) {
+        if let Err(error) = self.present() {
+            self.failure = Some(error);
+        }
+    }
+
+    /// Waits until the next frame is due, if it is to be as fast as the real world.
+    fn keep_pace(&mut self) {
+        let now = Instant::now();
+        self.due += self.time_step;
+        if !self.controls.is_real_time || now > self.due + MOST_LATE {
+            self.due = now;
+        } else if self.due > now {
+            std::thread::sleep(self.due - now);
+        }
+    }
+}
+
+impl Renderer for View {
+    fn draw(&mut self, object: &Object) {
+        if self.is_shown {
+            self.painter.add(object);
+        }
+    }
+
+    fn swap(&mut self, _frame: u64) {
+        if self.is_shown && self.failure().is_none() {
+            if let Err(error) = self.present() {
+                self.failure = Some(error);
+            }
+            self.next_shown = self.next_shown.max(Instant::now() - self.between_shown);
+            self.next_shown += self.between_shown;
+        }
+        self.attend(Duration::ZERO);
+        self.keep_pace();
+        self.is_shown = Instant::now() + self.time_step / 2 >= self.next_shown;
+    }
+}
