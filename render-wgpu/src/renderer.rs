@@ -60,11 +60,12 @@ impl Painter {
         let device = &gpu.device;
         let format = Format { color, samples: look.quality.samples() };
         let layouts = Layouts::new(device);
+        let surfaces = Surfaces::new(device, &layouts, format);
         Ok(Self {
-            globals: Globals::new(device, &layouts, look.quality),
-            surfaces: Surfaces::new(device, &layouts, format),
+            globals: Globals::new(device, &layouts, look.quality, surfaces.buffer()),
+            surfaces,
             room: Room::new(device, &layouts, format),
-            picker: Picker::new(device, &layouts, Globals::SIZE),
+            picker: Picker::new(device, &layouts),
             units: Units::new(),
             target: Target::new(device, format, size.0, size.1),
             camera: Camera::around(&look.focus),
@@ -153,10 +154,14 @@ impl Painter {
             return;
         }
         let Gpu { device, queue, .. } = &self.gpu;
-        self.globals.upload(queue, &view);
-        if let Err(error) = self.surfaces.upload(device, queue, &self.layouts) {
-            self.failure = Some(error);
-            return;
+        let numbers = view.numbers();
+        match self.surfaces.upload((device, queue), &self.layouts, numbers.as_words()) {
+            Ok(false) => {}
+            Ok(true) => self.globals.rebind(device, &self.layouts, self.surfaces.buffer()),
+            Err(error) => {
+                self.failure = Some(error);
+                return;
+            }
         }
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("shadows"),
