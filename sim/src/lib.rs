@@ -33,6 +33,7 @@ pub mod geometry;
 pub mod interaction;
 pub mod manager;
 pub mod message;
+mod mix;
 pub mod object;
 pub mod pool;
 pub mod render;

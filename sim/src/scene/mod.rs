@@ -1,11 +1,13 @@
 //! Environments ready to run.
 
+mod bone;
 mod particles;
 mod random;
 
 use crate::object::Object;
 use crate::stages::Stages;
 
+pub use bone::{bone_piece, drill_burr_hole};
 pub use particles::{ParticleScene, SceneError};
 
 /// An environment at its start.
