@@ -40,7 +40,9 @@ fn main() {
     let fill = |[x, y, z]: [u32; 3]| (x ^ y ^ z) as u8;
     let head = Volume::from_fn(DIMS, SPACING, Pose::IDENTITY, fill).expect("a CT's size");
     show("a head of 512 × 512 × 300 voxels is built", began.elapsed().as_secs_f64());
-    let piece = seconds(|_| drop(black_box(bone_piece(128, Pose::IDENTITY))));
+    let piece = seconds(|_| {
+        black_box(bone_piece(128, Pose::IDENTITY));
+    });
     show("a piece of skull of 128³ voxels is built", piece);
 
     let mut object = Object::new(ObjectId(0), Group(0), Geometry::Volume(head), Fixed);
@@ -65,11 +67,17 @@ fn main() {
     show("a copy follows", copying);
 
     let volume = object.geometry.as_volume().expect("a volume");
-    let told = seconds(|_| drop(black_box(volume.changed_since(volume.revision()).count())));
+    let told = seconds(|_| {
+        black_box(volume.changed_since(volume.revision()).count());
+    });
     show("that no brick changed is found", told);
-    let density = seconds(|number| drop(black_box(volume.density_at(at(number)))));
+    let density = seconds(|number| {
+        black_box(volume.density_at(at(number)));
+    });
     show("the density at a point", density);
-    let gradient = seconds(|number| drop(black_box(volume.gradient_at(at(number)))));
+    let gradient = seconds(|number| {
+        black_box(volume.gradient_at(at(number)));
+    });
     show("the gradient at a point", gradient);
     let mut sum = 0.0;
     let visit = seconds(|number| {

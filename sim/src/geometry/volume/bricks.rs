@@ -78,13 +78,6 @@ impl Layout {
         first..(first + BRICK_SIDE).min(self.dims[axis])
     }
 
-    /// The brick of a voxel and the voxel's number in it.
-    fn locate(self, voxel: [u32; 3]) -> (usize, usize) {
-        let [x, y, z] = voxel.map(|index| (index % BRICK_SIDE) as usize);
-        let side = BRICK_SIDE as usize;
-        (self.brick(voxel.map(|index| index / BRICK_SIDE)), (z * side + y) * side + x)
-    }
-
     /// The voxels of a box, brick by brick: each brick's number and its part of the box.
     pub(super) fn bricks_in(
         self,
@@ -102,6 +95,13 @@ impl Layout {
             (self.brick(place), part)
         })
     }
+}
+
+/// A voxel's number in its brick.
+fn slot(voxel: [u32; 3]) -> usize {
+    let [x, y, z] = voxel.map(|index| (index % BRICK_SIDE) as usize);
+    let side = BRICK_SIDE as usize;
+    (z * side + y) * side + x
 }
 
 /// The densities of a grid of voxels, in bricks.
@@ -124,12 +124,12 @@ impl Bricks {
         let mut digest = 0_u64;
         for (brick, densities) in voxels.iter_mut().enumerate() {
             let place = layout.place(brick);
-            let [xs, ys, zs] = std::array::from_fn(|axis| layout.span(place[axis], axis));
-            for voxel in boxed([xs, ys, zs]) {
-                let (_, slot) = layout.locate(voxel);
-                densities[slot] = density(voxel);
-                digest = digest.wrapping_add(part_of_digest(brick, slot, densities[slot]));
-            }
+            let spans = std::array::from_fn(|axis| layout.span(place[axis], axis));
+            boxed(spans).for_each(|voxel| {
+                let (slot, density) = (slot(voxel), density(voxel));
+                densities[slot] = density;
+                digest = digest.wrapping_add(part_of_digest(brick, slot, density));
+            });
         }
         let header = |densities| Header { revision, peak: peak(densities) };
         let headers = voxels.iter().map(header).collect();
@@ -157,8 +157,8 @@ impl Bricks {
         if (0..3).any(|axis| voxel[axis] >= self.layout.dims[axis]) {
             return 0;
         }
-        let (brick, slot) = self.layout.locate(voxel);
-        self.voxels[brick][slot]
+        let brick = self.layout.brick(voxel.map(|index| index / BRICK_SIDE));
+        self.voxels[brick][slot(voxel)]
     }
 
     pub(super) fn changed_since(&self, revision: u64) -> impl Iterator<Item = Brick<'_>> {
@@ -187,15 +187,14 @@ impl Bricks {
         for (brick, part) in self.layout.bricks_in(range) {
             let densities = &mut self.voxels[brick];
             let before = total;
-            for voxel in boxed(part) {
-                let (_, slot) = self.layout.locate(voxel);
-                let density = densities[slot];
-                let removed = amount(voxel, density).min(density);
-                densities[slot] = density - removed;
-                let part = part_of_digest(brick, slot, removed);
+            boxed(part).for_each(|voxel| {
+                let density = &mut densities[slot(voxel)];
+                let removed = amount(voxel, *density).min(*density);
+                *density -= removed;
+                let part = part_of_digest(brick, slot(voxel), removed);
                 self.digest = self.digest.wrapping_sub(part);
                 total += u64::from(removed);
-            }
+            });
             if total > before {
                 let revision = *revision.get_or_insert_with(new_revision);
                 self.headers[brick] = Header { revision, peak: peak(densities) };

@@ -187,13 +187,14 @@ impl Volume {
     pub fn visit(&self, center: Vec3, radius: f32, mut visit: impl FnMut(&Voxel)) {
         let ball = self.ball(center, radius);
         let range = ball.range(self.dims());
-        for voxel in self.bricks.layout().bricks_in(&range).flat_map(|(_, part)| boxed(part)) {
-            let (offset, overlap) = ball.overlap(voxel);
+        let voxels = self.bricks.layout().bricks_in(&range).flat_map(|(_, part)| boxed(part));
+        voxels.for_each(|index| {
+            let (offset, overlap) = ball.overlap(index);
             if overlap > 0.0 {
-                let density = self.bricks.get(voxel.map(|index| index as i32));
-                visit(&Voxel { index: voxel, offset, overlap, density });
+                let density = self.bricks.get(index.map(|index| index as i32));
+                visit(&Voxel { index, offset, overlap, density });
             }
-        }
+        });
     }
 
     /// Lowers the density of every voxel that [`Volume::visit`] would show, by what `amount` says of it,
