@@ -1,5 +1,27 @@
-//! The renderer of dualframe's virtual environments.
+//! The renderer of dualframe's virtual environments, on wgpu.
 //!
-//! The wgpu renderer is still to come. Until then this package holds the `dualframe` program,
-//! which runs environments without a picture.
+//! It belongs to whoever holds the pipeline's one render token, and what runs under the token is only
+//! what must be single: an object's positions are copied as they are ([`renderer::Painter::add`]), and a frame is
+//! encoded and submitted in a handful of calls. Normals, colours and shadows are made on the device.
+//!
+//! | module | what it has |
+//! |---|---|
+//! | [`gpu`] | the device and how it is chosen |
+//! | [`renderer`] | what draws, into any texture or offscreen |
+//! | [`camera`], [`look`] | from where, and how |
+//! | [`picture`] | finished pictures, PNG |
+//! | [`error`] | what can go wrong |
+//!
+//! The `dualframe` program is in this package too, behind the feature `app`, which is on by default.
 #![forbid(unsafe_code)]
+
+pub mod camera;
+pub mod error;
+mod globals;
+pub mod gpu;
+pub mod look;
+pub mod picture;
+pub mod renderer;
+mod room;
+mod surface;
+mod target;

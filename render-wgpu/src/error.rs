@@ -1,0 +1,70 @@
+//! What can go wrong with a graphics adapter.
+
+use thiserror::Error;
+
+/// Why there is no picture, or no further one.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum GraphicsError {
+    /// The machine has no adapter that could draw.
+    #[error(
+        "no graphics adapter was found; on Debian and Ubuntu the package mesa-vulkan-drivers brings \
+         one in software"
+    )]
+    NoAdapter,
+    /// No adapter has the name asked for.
+    #[error("no graphics adapter is called {name:?}; there are: {there}")]
+    NoSuchAdapter {
+        /// The name asked for.
+        name: String,
+        /// The adapters there are.
+        there: String,
+    },
+    /// The adapter lacks something that the renderer needs.
+    #[error("the graphics adapter {adapter} lacks {lacking}")]
+    Unfit {
+        /// The adapter.
+        adapter: String,
+        /// What it lacks.
+        lacking: &'static str,
+    },
+    /// The adapter gave no device.
+    #[error("the graphics adapter {adapter} cannot be used: {reason}")]
+    NoDevice {
+        /// The adapter.
+        adapter: String,
+        /// What its driver says.
+        reason: String,
+    },
+    /// The picture is larger than the adapter can draw.
+    #[error(
+        "a picture of {width} by {height} pixels was asked for; there can be 1 to {most} each way"
+    )]
+    Size {
+        /// Its width, in pixels.
+        width: u32,
+        /// Its height, in pixels.
+        height: u32,
+        /// The greatest width and height.
+        most: u32,
+    },
+    /// The objects of a frame are more than the adapter's buffers hold.
+    #[error("a frame of {needed} bytes was to be drawn; the adapter allows {most}")]
+    Frame {
+        /// What the frame needs, in bytes.
+        needed: u64,
+        /// What a buffer may have, in bytes.
+        most: u64,
+    },
+    /// The device failed while it was drawing.
+    #[error("the graphics device failed: {reason}")]
+    Lost {
+        /// What its driver says.
+        reason: String,
+    },
+    /// The window's surface cannot be drawn to.
+    #[error("the window cannot be drawn to: {reason}")]
+    Surface {
+        /// What its driver says.
+        reason: String,
+    },
+}

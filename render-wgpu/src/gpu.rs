@@ -1,0 +1,152 @@
+//! The graphics device and how it is chosen.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use wgpu::{
+    Adapter, AdapterInfo, Backends, Device, DeviceDescriptor, DownlevelFlags, Instance,
+    InstanceDescriptor, PowerPreference, Queue, RequestAdapterOptions, Surface,
+};
+
+use crate::error::GraphicsError;
+
+/// A graphics device. What happens to it, it notes: none of its calls panics when it fails.
+pub struct Gpu {
+    /// The device.
+    pub device: Device,
+    /// Its queue.
+    pub queue: Queue,
+    adapter: Adapter,
+    failure: Arc<Mutex<Option<String>>>,
+}
+
+impl Gpu {
+    /// A device that draws without a window.
+    ///
+    /// `name` is a part of the adapter's name in any case, as is the environment's `WGPU_ADAPTER_NAME`
+    /// if there is none; without either the system's preferred adapter is taken, by `WGPU_POWER_PREF`
+    /// (`low` or `high`; high if not set). `WGPU_BACKEND` (`vulkan`, `gl`, `metal`, `dx12`) narrows the
+    /// choice.
+    ///
+    /// # Errors
+    /// No adapter, none of that name, or one that cannot draw what is needed.
+    pub fn new(name: Option<&str>) -> Result<Self, GraphicsError> {
+        let instance = Instance::new(InstanceDescriptor::new_without_display_handle_from_env());
+        Self::from_instance(&instance, None, name)
+    }
+
+    /// As [`Gpu::new`], for a window's surface.
+    ///
+    /// # Errors
+    /// As [`Gpu::new`].
+    pub fn for_surface(
+        instance: &Instance,
+        surface: &Surface<'_>,
+        name: Option<&str>,
+    ) -> Result<Self, GraphicsError> {
+        Self::from_instance(instance, Some(surface), name)
+    }
+
+    fn from_instance(
+        instance: &Instance,
+        surface: Option<&Surface<'_>>,
+        name: Option<&str>,
+    ) -> Result<Self, GraphicsError> {
+        let from_environment = std::env::var("WGPU_ADAPTER_NAME").ok();
+        let adapter = match name.map(str::to_owned).or(from_environment) {
+            Some(name) => by_name(instance, surface, name)?,
+            None => preferred(instance, surface)?,
+        };
+        let info = adapter.get_info();
+        if !adapter.get_downlevel_capabilities().flags.contains(DownlevelFlags::VERTEX_STORAGE) {
+            let lacking = "storage buffers in vertex shaders";
+            return Err(GraphicsError::Unfit { adapter: title(&info), lacking });
+        }
+        let wanted = DeviceDescriptor { required_limits: adapter.limits(), ..Default::default() };
+        let (device, queue) =
+            pollster::block_on(adapter.request_device(&wanted)).map_err(|error| {
+                GraphicsError::NoDevice { adapter: title(&info), reason: one_line(&error) }
+            })?;
+        let failure = Arc::new(Mutex::new(None));
+        note_failures(&device, &failure);
+        Ok(Self { device, queue, adapter, failure })
+    }
+
+    /// The adapter.
+    #[must_use]
+    pub fn adapter(&self) -> &Adapter {
+        &self.adapter
+    }
+
+    /// The adapter's name, kind and driver in one line.
+    #[must_use]
+    pub fn title(&self) -> String {
+        title(&self.adapter.get_info())
+    }
+
+    /// Whether the adapter is software that draws on the processor's cores.
+    #[must_use]
+    pub fn is_software(&self) -> bool {
+        self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// The first thing that went wrong with the device, if anything did. Nothing is drawn from then on.
+    #[must_use]
+    pub fn failure(&self) -> Option<GraphicsError> {
+        let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        failure.as_ref().map(|reason| GraphicsError::Lost { reason: reason.clone() })
+    }
+
+    /// The greatest width and height of a picture, in pixels.
+    #[must_use]
+    pub fn most_pixels(&self) -> u32 {
+        self.device.limits().max_texture_dimension_2d
+    }
+}
+
+/// Keeps the first failure: the later ones follow from it.
+fn note_failures(device: &Device, failure: &Arc<Mutex<Option<String>>>) {
+    let note = |failure: &Mutex<Option<String>>, reason: String| {
+        failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(reason);
+    };
+    let lost = Arc::clone(failure);
+    device.set_device_lost_callback(move |_, reason| note(&lost, one_line(&reason)));
+    let wrong = Arc::clone(failure);
+    device.on_uncaptured_error(Arc::new(move |error| note(&wrong, one_line(&error))));
+}
+
+fn preferred(instance: &Instance, surface: Option<&Surface<'_>>) -> Result<Adapter, GraphicsError> {
+    let options = RequestAdapterOptions {
+        power_preference: PowerPreference::from_env().unwrap_or(PowerPreference::HighPerformance),
+        compatible_surface: surface,
+        ..Default::default()
+    };
+    pollster::block_on(instance.request_adapter(&options)).map_err(|_| GraphicsError::NoAdapter)
+}
+
+fn by_name(
+    instance: &Instance,
+    surface: Option<&Surface<'_>>,
+    name: String,
+) -> Result<Adapter, GraphicsError> {
+    let mut adapters = pollster::block_on(instance.enumerate_adapters(Backends::all()));
+    adapters.retain(|adapter| surface.is_none_or(|surface| adapter.is_surface_supported(surface)));
+    if adapters.is_empty() {
+        return Err(GraphicsError::NoAdapter);
+    }
+    let titles: Vec<_> = adapters.iter().map(|adapter| title(&adapter.get_info())).collect();
+    let wanted = name.to_lowercase();
+    match titles.iter().position(|title| title.to_lowercase().contains(&wanted)) {
+        Some(index) => Ok(adapters.swap_remove(index)),
+        None => Err(GraphicsError::NoSuchAdapter { name, there: titles.join(", ") }),
+    }
+}
+
+fn title(info: &AdapterInfo) -> String {
+    format!("{} ({})", info.name, info.backend)
+}
+
+/// An error's text in one line.
+pub(crate) fn one_line(error: &impl ToString) -> String {
+    let text = error.to_string();
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,120 @@
+//! A finished picture, and how it comes from the device.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use wgpu::{
+    Buffer, BufferDescriptor, BufferUsages, COPY_BYTES_PER_ROW_ALIGNMENT, CommandEncoder, Device,
+    Extent3d, MapMode, PollType, TexelCopyBufferInfo, TexelCopyBufferLayout, Texture,
+};
+
+use crate::error::GraphicsError;
+
+/// Bytes of a pixel.
+const PIXEL: u32 = 4;
+
+/// A picture, row by row from the top, four bytes a pixel: red, green, blue (sRGB) and opacity.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// Its width, in pixels.
+    pub width: u32,
+    /// Its height, in pixels.
+    pub height: u32,
+    /// Its pixels.
+    pub pixels: Vec<u8>,
+}
+
+impl Picture {
+    /// Writes it as PNG.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn write_png(&self, writer: impl Write) -> io::Result<()> {
+        let mut encoder = png::Encoder::new(writer, self.width, self.height);
+        encoder.set_color(png::ColorType::Rgba);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&self.pixels)?;
+        Ok(writer.finish()?)
+    }
+
+    /// Writes it to a file, as PNG.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn save(&self, path: &Path) -> io::Result<()> {
+        let mut file = BufWriter::new(File::create(path)?);
+        self.write_png(&mut file)?;
+        file.flush()
+    }
+}
+
+/// Memory that a picture is read through.
+pub(crate) struct Readback {
+    buffer: Buffer,
+    width: u32,
+    height: u32,
+    /// Bytes from one row to the next.
+    stride: u32,
+}
+
+impl Readback {
+    pub(crate) fn new(device: &Device, width: u32, height: u32) -> Self {
+        let stride = (width * PIXEL).next_multiple_of(COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = device.create_buffer(&BufferDescriptor {
+            label: Some("picture"),
+            size: u64::from(stride) * u64::from(height),
+            usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        Self { buffer, width, height, stride }
+    }
+
+    /// Copies a texture of this size after what was encoded so far.
+    pub(crate) fn copy(&self, encoder: &mut CommandEncoder, texture: &Texture) {
+        let layout = TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(self.stride),
+            rows_per_image: Some(self.height),
+        };
+        let (width, height) = (self.width, self.height);
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            TexelCopyBufferInfo { buffer: &self.buffer, layout },
+            Extent3d { width, height, depth_or_array_layers: 1 },
+        );
+    }
+
+    /// Waits for what was submitted, and reads it.
+    pub(crate) fn read(&self, device: &Device) -> Result<Picture, GraphicsError> {
+        let bytes = read_buffer(device, &self.buffer)?;
+        let (stride, row) = (self.stride as usize, (self.width * PIXEL) as usize);
+        let pixels = bytes.chunks(stride).flat_map(|padded| &padded[..row]).copied().collect();
+        Ok(Picture { width: self.width, height: self.height, pixels })
+    }
+}
+
+/// Waits for what was submitted, and reads a buffer.
+pub(crate) fn read_buffer(device: &Device, buffer: &Buffer) -> Result<Vec<u8>, GraphicsError> {
+    let lost = |reason: String| GraphicsError::Lost { reason };
+    let (told, told_out) = std::sync::mpsc::channel();
+    buffer.map_async(MapMode::Read, .., move |mapped| {
+        // Nobody listens any more only if this function has failed.
+        let _ = told.send(mapped);
+    });
+    device.poll(PollType::wait_indefinitely()).map_err(|error| lost(error.to_string()))?;
+    match told_out.try_recv() {
+        Ok(Ok(())) => {
+            let bytes = match buffer.get_mapped_range(..) {
+                Ok(mapped) => mapped.to_vec(),
+                Err(error) => return Err(lost(error.to_string())),
+            };
+            buffer.unmap();
+            Ok(bytes)
+        }
+        Ok(Err(error)) => Err(lost(error.to_string())),
+        Err(_) => Err(lost("it gave no answer".to_owned())),
+    }
+}

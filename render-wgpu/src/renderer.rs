@@ -1,0 +1,235 @@
+//! The renderer: what the token's holder draws with.
+
+use dualframe_sim::geometry::Geometry;
+use dualframe_sim::object::Object;
+use dualframe_sim::render::Renderer;
+use wgpu::{
+    CommandEncoder, PollType, RenderPassDescriptor, SubmissionIndex, Texture, TextureFormat,
+    TextureUsages, TextureView,
+};
+
+use crate::camera::Camera;
+use crate::error::GraphicsError;
+use crate::globals::{Globals, View};
+use crate::gpu::Gpu;
+use crate::look::Look;
+use crate::picture::{Picture, Readback};
+use crate::room::Room;
+use crate::surface::{Layouts, Surfaces};
+use crate::target::{Format, Target, texture};
+
+/// The format of pictures without a window.
+pub const OFFSCREEN_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
+
+/// Draws the objects of a frame into whatever texture it is given.
+///
+/// Objects are taken one by one, in any order; nothing is sent to the device before [`Painter::paint`].
+pub struct Painter {
+    gpu: Gpu,
+    /// From where the next frame is seen.
+    pub camera: Camera,
+    /// What the next frame looks like; its quality stays that of the beginning.
+    pub look: Look,
+    layouts: Layouts,
+    globals: Globals,
+    surfaces: Surfaces,
+    room: Room,
+    format: Format,
+    target: Target,
+    /// The frame being drawn, from its first object on.
+    view: Option<View>,
+    failure: Option<GraphicsError>,
+}
+
+impl Painter {
+    /// A painter of pictures of so many pixels in a texture format, sRGB by preference.
+    ///
+    /// # Errors
+    /// No pixels, or more than the adapter allows.
+    pub fn new(
+        gpu: Gpu,
+        look: Look,
+        color: TextureFormat,
+        size: (u32, u32),
+    ) -> Result<Self, GraphicsError> {
+        check_size(&gpu, size)?;
+        let device = &gpu.device;
+        let format = Format { color, samples: look.quality.samples() };
+        let layouts = Layouts::new(device);
+        Ok(Self {
+            globals: Globals::new(device, &layouts, look.quality),
+            surfaces: Surfaces::new(device, &layouts, format),
+            room: Room::new(device, &layouts, format),
+            target: Target::new(device, format, size.0, size.1),
+            camera: Camera::around(&look.focus),
+            layouts,
+            format,
+            look,
+            gpu,
+            view: None,
+            failure: None,
+        })
+    }
+
+    /// The device.
+    #[must_use]
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Draws at another size from the next frame on.
+    ///
+    /// # Errors
+    /// No pixels, or more than the adapter allows.
+    pub fn resize(&mut self, width: u32, height: u32) -> Result<(), GraphicsError> {
+        check_size(&self.gpu, (width, height))?;
+        if (width, height) != self.size() {
+            self.target = Target::new(&self.gpu.device, self.format, width, height);
+        }
+        Ok(())
+    }
+
+    /// The pictures' width and height, in pixels.
+    #[must_use]
+    pub fn size(&self) -> (u32, u32) {
+        (self.target.width, self.target.height)
+    }
+
+    /// Why nothing is drawn any more, if so. The objects go on without pictures.
+    #[must_use]
+    pub fn failure(&self) -> Option<GraphicsError> {
+        self.failure.clone().or_else(|| self.gpu.failure())
+    }
+
+    /// The number of objects taken for this frame: those that are not culled.
+    #[must_use]
+    pub fn drawn(&self) -> usize {
+        self.surfaces.count()
+    }
+
+    /// Takes an object of this frame, unless neither it nor its shadow is in the picture.
+    pub fn add(&mut self, object: &Object) {
+        let Self { gpu, layouts, surfaces, .. } = self;
+        let view = self.view.get_or_insert_with(|| {
+            surfaces.clear();
+            View::new(self.camera, self.look, self.target.aspect())
+        });
+        if self.failure.is_some() || !view.may_see(&object.bounds()) {
+            return;
+        }
+        match &object.geometry {
+            Geometry::Mesh(mesh) => {
+                surfaces.add_mesh(&gpu.device, layouts, object, mesh, view.look.coloring);
+            }
+            Geometry::Rigid(rigid) => surfaces.add_rigid(&gpu.device, layouts, object, rigid),
+        }
+    }
+
+    /// Ends the frame: encodes how `picture`, a view of a texture of this size and format, is made of
+    /// what was taken. Does nothing once the device has failed.
+    pub fn paint(&mut self, encoder: &mut CommandEncoder, picture: &TextureView) {
+        let view = self.view.take().unwrap_or_else(|| {
+            self.surfaces.clear();
+            View::new(self.camera, self.look, self.target.aspect())
+        });
+        if self.failure().is_some() {
+            return;
+        }
+        let Gpu { device, queue, .. } = &self.gpu;
+        self.globals.upload(queue, &view);
+        if let Err(error) = self.surfaces.upload(device, queue, &self.layouts) {
+            self.failure = Some(error);
+            return;
+        }
+        let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+            label: Some("shadows"),
+            depth_stencil_attachment: Some(self.globals.shadow_map()),
+            ..Default::default()
+        });
+        self.surfaces.cast(&mut pass, &self.globals.plain);
+        drop(pass);
+        let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+            label: Some("picture"),
+            color_attachments: &[Some(self.target.color(picture))],
+            depth_stencil_attachment: Some(self.target.depth()),
+            ..Default::default()
+        });
+        if view.look.room {
+            self.room.paint(&mut pass, &self.globals.lit);
+        }
+        self.surfaces.paint(&mut pass, &self.globals.lit);
+    }
+}
+
+fn check_size(gpu: &Gpu, (width, height): (u32, u32)) -> Result<(), GraphicsError> {
+    let most = gpu.most_pixels();
+    let fits = |pixels: u32| (1..=most).contains(&pixels);
+    if fits(width) && fits(height) {
+        Ok(())
+    } else {
+        Err(GraphicsError::Size { width, height, most })
+    }
+}
+
+/// Draws every frame without a window. The last frame's picture can be read.
+pub struct Offscreen {
+    /// What draws.
+    pub painter: Painter,
+    texture: Texture,
+    view: TextureView,
+    readback: Readback,
+    /// The frame submitted last: the device is at most one frame behind.
+    submitted: Option<SubmissionIndex>,
+}
+
+impl Offscreen {
+    /// A renderer of pictures of so many pixels.
+    ///
+    /// # Errors
+    /// No pixels, or more than the adapter allows.
+    pub fn new(gpu: Gpu, look: Look, (width, height): (u32, u32)) -> Result<Self, GraphicsError> {
+        let painter = Painter::new(gpu, look, OFFSCREEN_FORMAT, (width, height))?;
+        let device = &painter.gpu().device;
+        let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC;
+        let texture = texture(device, "picture", OFFSCREEN_FORMAT, (width, height), 1, usage);
+        let view = texture.create_view(&Default::default());
+        let readback = Readback::new(device, width, height);
+        Ok(Self { painter, texture, view, readback, submitted: None })
+    }
+
+    /// Reads the picture of the last frame.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn picture(&self) -> Result<Picture, GraphicsError> {
+        if let Some(failure) = self.painter.failure() {
+            return Err(failure);
+        }
+        let Gpu { device, queue, .. } = self.painter.gpu();
+        let mut encoder = device.create_command_encoder(&Default::default());
+        self.readback.copy(&mut encoder, &self.texture);
+        queue.submit([encoder.finish()]);
+        let picture = self.readback.read(device);
+        picture.map_err(|error| self.painter.failure().unwrap_or(error))
+    }
+}
+
+impl Renderer for Offscreen {
+    fn draw(&mut self, object: &Object) {
+        self.painter.add(object);
+    }
+
+    fn swap(&mut self, _frame: u64) {
+        let mut encoder = self.painter.gpu().device.create_command_encoder(&Default::default());
+        self.painter.paint(&mut encoder, &self.view);
+        if self.painter.failure().is_some() {
+            return;
+        }
+        let Gpu { device, queue, .. } = self.painter.gpu();
+        let submitted = queue.submit([encoder.finish()]);
+        if let Some(before) = self.submitted.replace(submitted) {
+            // A failure is noted by the device's own callbacks.
+            let _ = device.poll(PollType::Wait { submission_index: Some(before), timeout: None });
+        }
+    }
+}
