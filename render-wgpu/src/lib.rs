@@ -25,3 +25,4 @@ pub mod renderer;
 mod room;
 mod surface;
 mod target;
+mod volume;
