@@ -34,7 +34,9 @@ fn offscreen() -> Offscreen {
     let focus = Bounds { min: Vec3::splat(-0.03), max: Vec3::splat(0.03) };
     let gpu = Gpu::new(None).expect("these tests need a graphics adapter; one in software will do");
     let look = Look { room: false, ..Look::room(focus, Quality::Fast) };
-    Offscreen::new(gpu, look, SIZE).expect("a small picture")
+    let mut offscreen = Offscreen::new(gpu, look, SIZE).expect("a small picture");
+    offscreen.painter.camera.pitch = 0.9;
+    offscreen
 }
 
 fn draw(offscreen: &mut Offscreen, objects: &[Object]) -> Picture {
@@ -63,7 +65,8 @@ fn differing(a: &Picture, b: &Picture, by: u8) -> usize {
 }
 
 fn reds(picture: &Picture) -> usize {
-    pixels(picture).filter(|[r, g, b, _]| *r > 60 && *r > 3 * g.max(b)).count()
+    let is_red = |&[r, g, b, _]: &[u8; 4]| r > 60 && r / 3 > g.max(b);
+    pixels(picture).filter(is_red).count()
 }
 
 #[test]
@@ -75,7 +78,7 @@ fn a_full_grid_is_a_cuboid() {
     let expected = draw(&mut offscreen(), &[object(0, Geometry::Rigid(rigid), BONE)]);
     let picture = draw(&mut offscreen(), &[object(0, Geometry::Volume(volume), BONE)]);
     let empty = draw(&mut offscreen(), &[]);
-    assert!(differing(&expected, &empty, 8) > 8_000, "nothing was tested");
+    assert!(differing(&expected, &empty, 8) > 3_000, "nothing was tested");
     let wrong = differing(&picture, &expected, 8);
     assert!(wrong < 200, "{wrong} pixels differ");
 }
@@ -94,8 +97,6 @@ fn a_ball_of_voxels_is_a_ball() {
     let expected = draw(&mut offscreen(), &[object(0, Geometry::Rigid(rigid), BONE)]);
     let picture = draw(&mut offscreen(), &[object(0, Geometry::Volume(volume), BONE)]);
     let wrong = differing(&picture, &expected, 12);
-    picture.save(std::path::Path::new("/tmp/ball-v.png")).unwrap();
-    expected.save(std::path::Path::new("/tmp/ball-e.png")).unwrap();
     assert!(wrong < 500, "{wrong} pixels differ");
 }
 
@@ -154,7 +155,7 @@ fn sending_what_changed_is_enough() {
     for step in 0..4 {
         let bone = object.geometry.as_volume_mut().expect("a volume");
         let entry = Vec3::new(0.008 * step as f32 - 0.012, 0.02, 0.004);
-        drill_burr_hole(bone, entry, Vec3::NEG_Y, 0.003, 0.03);
+        drill_burr_hole(bone, entry, Vec3::NEG_Y, 0.004, 0.03);
         if step == 1 {
             // Changed twice while it is out of sight.
             offscreen.painter.camera =
@@ -164,7 +165,7 @@ fn sending_what_changed_is_enough() {
             continue;
         }
         let picture = draw(&mut offscreen, std::slice::from_ref(&object));
-        assert!(differing(&picture, &last, 20) > 100, "hole {step} is not seen");
+        assert!(differing(&picture, &last, 8) > 40, "hole {step} is not seen");
         let anew = draw(&mut self::offscreen(), std::slice::from_ref(&object));
         assert_eq!(differing(&picture, &anew, 0), 0, "hole {step}");
         last = picture;

@@ -49,13 +49,14 @@ fn density(at: vec3f) -> f32 {
     return textureSampleLevel(densities, linear_sampler, at / sides(), 0.0).r;
 }
 
-// The outward normal at a place, of any length, in the world.
+// The outward normal at a place, of any length, in the world: central differences, each the mean of the
+// four between corners of a cube around the place. Along the axes alone, steps between voxels would show.
 fn outward(at: vec3f) -> vec3f {
-    let x = vec3f(1.0, 0.0, 0.0);
-    let y = vec3f(0.0, 1.0, 0.0);
-    let z = vec3f(0.0, 0.0, 1.0);
-    let difference = vec3f(density(at - x) - density(at + x), density(at - y) - density(at + y),
-                           density(at - z) - density(at + z));
+    var difference = vec3f(0.0);
+    for (var k = 0u; k < 8u; k++) {
+        let side = vec3f((vec3u(k) >> vec3u(0u, 1u, 2u)) & vec3u(1u)) * 2.0 - 1.0;
+        difference -= side * density(at + side);
+    }
     return turned(grid.rotation, difference / grid.spacing);
 }
 
@@ -203,7 +204,7 @@ fn fragment(side: Side) -> Pixel {
     let below = density(hit.place - along_voxels(normal * 5e-4));
     let albedo = mix(MARROW, grid.color.rgb, smoothstep(0.25, 0.8, below));
     let clip = globals.view_projection * vec4f(hit.position, 1.0);
-    return Pixel(vec4f(shade(hit.position, normal, albedo, 0.25), 1.0), clip.z / clip.w);
+    return Pixel(vec4f(shade(hit.position, normal, albedo, 0.5), 1.0), clip.z / clip.w);
 }
 
 @fragment
