@@ -19,13 +19,15 @@ use crate::picture::{Picture, Readback};
 use crate::room::Room;
 use crate::surface::{Layouts, Surfaces};
 use crate::target::{Format, Target, texture};
+use crate::volume::Volumes;
 
 /// The format of pictures without a window.
 pub const OFFSCREEN_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 
 /// Draws the objects of a frame into whatever texture it is given.
 ///
-/// Objects are taken one by one, in any order; nothing is sent to the device before [`Painter::paint`].
+/// Objects are taken one by one, in any order; nothing is sent to the device before
+/// [`Painter::paint`] but what changed of volumes.
 pub struct Painter {
     gpu: Gpu,
     /// From where the next frame is seen.
@@ -35,6 +37,7 @@ pub struct Painter {
     layouts: Layouts,
     globals: Globals,
     surfaces: Surfaces,
+    volumes: Volumes,
     room: Room,
     picker: Picker,
     units: Units,
@@ -64,6 +67,7 @@ impl Painter {
         Ok(Self {
             globals: Globals::new(device, &layouts, look.quality, surfaces.buffer()),
             surfaces,
+            volumes: Volumes::new(device, &layouts, format, look.quality),
             room: Room::new(device, &layouts, format),
             picker: Picker::new(device, &layouts),
             units: Units::new(),
@@ -117,14 +121,15 @@ impl Painter {
     /// The number of objects taken for this frame: those that are not culled.
     #[must_use]
     pub fn drawn(&self) -> usize {
-        self.surfaces.count()
+        self.surfaces.count() + self.volumes.count()
     }
 
     /// Takes an object of this frame, unless neither it nor its shadow is in the picture.
     pub fn add(&mut self, object: &Object) {
-        let Self { gpu, layouts, surfaces, .. } = self;
+        let Self { gpu, layouts, surfaces, volumes, .. } = self;
         let view = self.view.get_or_insert_with(|| {
             surfaces.clear();
+            volumes.clear();
             View::new(self.camera, self.look, self.target.aspect())
         });
         if self.failure.is_some() || !view.may_see(&object.bounds()) {
@@ -135,6 +140,10 @@ impl Painter {
                 surfaces.add_mesh(&gpu.device, layouts, object, mesh, view.look.coloring);
             }
             Geometry::Rigid(rigid) => surfaces.add_rigid(&gpu.device, layouts, object, rigid),
+            Geometry::Volume(volume) => {
+                let added = volumes.add(&gpu.device, &gpu.queue, object, volume);
+                self.failure = added.err();
+            }
         }
     }
 
@@ -148,6 +157,7 @@ impl Painter {
     pub fn paint(&mut self, encoder: &mut CommandEncoder, picture: &TextureView) {
         let view = self.view.take().unwrap_or_else(|| {
             self.surfaces.clear();
+            self.volumes.clear();
             View::new(self.camera, self.look, self.target.aspect())
         });
         if self.failure().is_some() {
@@ -169,6 +179,7 @@ impl Painter {
             ..Default::default()
         });
         self.surfaces.cast(&mut pass, &self.globals.plain);
+        self.volumes.cast(&mut pass, &self.globals.plain);
         drop(pass);
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("picture"),
@@ -180,6 +191,7 @@ impl Painter {
             self.room.paint(&mut pass, &self.globals.lit);
         }
         self.surfaces.paint(&mut pass, &self.globals.lit);
+        self.volumes.paint(&mut pass, &self.globals.lit);
         drop(pass);
         let Self { gpu, surfaces, picker, units, .. } = self;
         let size = (self.target.width, self.target.height);

@@ -35,6 +35,7 @@ pub mod interaction;
 pub mod mailbox;
 pub mod manager;
 pub mod message;
+mod mix;
 pub mod object;
 pub mod pool;
 pub mod render;

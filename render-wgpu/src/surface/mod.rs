@@ -29,7 +29,7 @@ use crate::target::Format;
 
 /// Frames after which what is no longer drawn is forgotten: surfaces that are cut get a new make with
 /// every cut.
-const KEPT_FRAMES: u64 = 600;
+pub(crate) const KEPT_FRAMES: u64 = 600;
 
 /// The surfaces of a frame.
 pub(crate) struct Surfaces {
