@@ -18,12 +18,14 @@ use super::args::Particles;
 use super::measure::Measure;
 use super::pictures::{self, Pictures};
 use super::report::{FrameMilliseconds, Report};
-use super::window::Session;
+use super::window::{Session, most_threads};
 
 /// Frames that are run serially too, to say what the speed-up is.
 const REFERENCE_FRAMES: u64 = 48;
-/// Spans of a worker that its timeline keeps; usually 65,536, some seconds of work.
-const KEPT_SPANS: usize = 1 << 16;
+/// Spans of a worker that its timeline keeps for a trace; usually 65,536, some seconds of work.
+const TRACED_SPANS: usize = 1 << 16;
+/// Spans of a worker that its timeline keeps for a window; usually 4,096, more than is shown.
+const SHOWN_SPANS: usize = 1 << 12;
 
 /// Why a run failed.
 #[derive(Debug, Error)]
@@ -68,7 +70,10 @@ pub(super) fn run(
     note: &dyn Fn(&str),
 ) -> Result<Report, RunError> {
     let settings = settings_of(args, args.executor, args.threads, args.entry());
-    let timeline = Arc::new(Timeline::new(args.threads + 1, KEPT_SPANS));
+    let spans = if args.trace.is_some() { TRACED_SPANS } else { SHOWN_SPANS };
+    // One more for whoever renders beside rayon's workers.
+    let workers = args.threads.max(most_threads()) + 1;
+    let timeline = Arc::new(Timeline::new(workers, spans));
     let window = open_window(args, &timeline, note)?;
     let mut manager = VeManager::new(build(args)?, settings)?;
     if window.is_some() || args.trace.is_some() {

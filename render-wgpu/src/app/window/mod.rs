@@ -30,6 +30,7 @@ use dualframe_sim::timeline::Timeline;
 use glam::Vec3;
 
 use self::controls::Controls;
+pub(super) use self::controls::most_threads;
 use self::view::{Shown, View};
 use crate::app::args::Particles;
 use crate::app::particles::{self, RunError};

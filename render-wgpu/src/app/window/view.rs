@@ -134,9 +134,8 @@ impl View {
         self.hand = Hand::new();
     }
 
-    /// Does what the person did, after waiting for it for up to `timeout`; says whether anything may look
-    /// different now.
-    pub(super) fn attend(&mut self, timeout: Duration) -> bool {
+    /// Does what the person did, after waiting for it for up to `timeout`.
+    pub(super) fn attend(&mut self, timeout: Duration) {
         self.event_loop.pump_app_events(Some(timeout), &mut self.input);
         let mut gestures = std::mem::take(&mut self.input.gestures);
         for gesture in gestures.drain(..) {
@@ -153,7 +152,6 @@ impl View {
             }
         }
         self.painter.look.coloring = self.controls.coloring;
-        std::mem::take(&mut self.input.has_changed)
     }
 
     fn act(&mut self, gesture: Gesture) {
