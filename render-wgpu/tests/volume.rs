@@ -1,5 +1,7 @@
 //! Volumes in pictures: where they are, what they hide, and that sending changes is enough.
 
+use std::f32::consts::FRAC_PI_2;
+
 use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::gpu::Gpu;
 use dualframe_render_wgpu::look::{Look, Quality};
@@ -151,7 +153,7 @@ fn from_inside_there_is_wall_all_around() {
 #[ignore = "needs a graphics adapter; .ci/run has one"]
 fn sending_what_changed_is_enough() {
     let pose =
-        Pose::from_parts(Vec3::new(-0.032, -0.038, 0.032), Quat::from_rotation_x(-1.570_796));
+        Pose::from_parts(Vec3::new(-0.032, -0.038, 0.032), Quat::from_rotation_x(-FRAC_PI_2));
     let mut object = object(0, Geometry::Volume(bone_piece(64, pose).expect("64 voxels")), BONE);
     let mut offscreen = offscreen();
     let first = draw(&mut offscreen, std::slice::from_ref(&object));

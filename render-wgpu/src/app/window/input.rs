@@ -117,10 +117,10 @@ impl ApplicationHandler for Input {
                 // What began outside the overlay stays outside it.
                 self.gestures.extend(self.held.map(|button| Gesture::Drag(button, moved)));
             }
-            WindowEvent::MouseInput { state, button, .. } => {
-                if !is_taken || state == ElementState::Released {
-                    self.press(state, button);
-                }
+            WindowEvent::MouseInput { state, button, .. }
+                if !is_taken || state == ElementState::Released =>
+            {
+                self.press(state, button);
             }
             WindowEvent::MouseWheel { delta, .. } if !is_taken => {
                 self.gestures.push(Gesture::Wheel(match delta {
