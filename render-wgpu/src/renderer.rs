@@ -15,7 +15,7 @@ use crate::globals::{Globals, View};
 use crate::gpu::Gpu;
 use crate::look::Look;
 use crate::pick::Picker;
-use crate::picture::{Picture, Readback};
+use crate::picture::{Picture, read_texture};
 use crate::room::Room;
 use crate::surface::{Layouts, Surfaces};
 use crate::target::{Format, Target, texture};
@@ -217,7 +217,6 @@ pub struct Offscreen {
     pub painter: Painter,
     texture: Texture,
     view: TextureView,
-    readback: Readback,
     /// The frame submitted last: the device is at most one frame behind.
     submitted: Option<SubmissionIndex>,
 }
@@ -233,8 +232,7 @@ impl Offscreen {
         let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC;
         let texture = texture(device, "picture", OFFSCREEN_FORMAT, (width, height), 1, usage);
         let view = texture.create_view(&Default::default());
-        let readback = Readback::new(device, width, height);
-        Ok(Self { painter, texture, view, readback, submitted: None })
+        Ok(Self { painter, texture, view, submitted: None })
     }
 
     /// Reads the picture of the last frame.
@@ -245,12 +243,7 @@ impl Offscreen {
         if let Some(failure) = self.painter.failure() {
             return Err(failure);
         }
-        let Gpu { device, queue, .. } = self.painter.gpu();
-        let mut encoder = device.create_command_encoder(&Default::default());
-        self.readback.copy(&mut encoder, &self.texture);
-        queue.submit([encoder.finish()]);
-        let picture = self.readback.read(device);
-        picture.map_err(|error| self.painter.failure().unwrap_or(error))
+        read_texture(self.painter.gpu(), &self.texture)
     }
 }
 

@@ -16,7 +16,7 @@ use thiserror::Error;
 use super::AllocationCounter;
 use super::args::Particles;
 use super::measure::Measure;
-use super::pictures::{self, Pictures};
+use super::pictures::Pictures;
 use super::report::{FrameMilliseconds, Report};
 use super::window::{Session, most_threads};
 
@@ -83,11 +83,7 @@ pub(super) fn run(
         Some(window) => {
             let mut measure = Measure::new(args.frames, count);
             measure.start();
-            let on_frame = &mut |record: &FrameRecord| measure.frame(record);
-            let (manager, look, camera) = window.run(manager, args.frames, on_frame)?;
-            if let Some(file) = &args.picture {
-                pictures::save(args, &manager, look, camera, file)?;
-            }
+            let manager = window.run(manager, args.frames, &mut |record| measure.frame(record))?;
             report(args, &manager, &measure, None)
         }
         None => run_unwatched(args, manager, settings, count)?,

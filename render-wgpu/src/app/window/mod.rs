@@ -18,14 +18,13 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
-use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::error::GraphicsError;
-use dualframe_render_wgpu::look::Look;
 use dualframe_sim::executor::{ExecutorError, ExecutorKind, FrameRecord};
 use dualframe_sim::manager::VeManager;
 use dualframe_sim::message::Message;
 use dualframe_sim::object::ObjectId;
 use dualframe_sim::scene::{ParticleScene, Scene};
+use dualframe_sim::stages;
 use dualframe_sim::timeline::Timeline;
 use glam::Vec3;
 
@@ -77,7 +76,7 @@ impl<'a> Session<'a> {
     }
 
     /// Runs the environment until the window is closed, or so many frames are done; gives back the
-    /// environment as it is then, and how it was looked at.
+    /// environment as it is then.
     ///
     /// # Errors
     /// The executor cannot go on, or the window can no longer be drawn to.
@@ -86,7 +85,7 @@ impl<'a> Session<'a> {
         mut manager: VeManager,
         frames: Option<u64>,
         on_frame: &mut dyn FnMut(&FrameRecord),
-    ) -> Result<(VeManager, Look, Camera), RunError> {
+    ) -> Result<VeManager, RunError> {
         self.view.turn_to(self.view.painter.look.focus, manager.mailbox());
         let mut left = frames.unwrap_or(u64::MAX);
         while left > 0 && !self.view.is_closing() {
@@ -104,10 +103,14 @@ impl<'a> Session<'a> {
             self.advance(&mut manager, count, on_frame)?;
             left -= count;
         }
-        match self.view.failure() {
-            Some(failure) => Err(failure.into()),
-            None => Ok((manager, self.view.painter.look, self.view.painter.camera)),
+        if let Some(failure) = self.view.failure() {
+            return Err(failure.into());
         }
+        if let Some(file) = &self.args.picture {
+            self.take(&manager);
+            self.view.picture()?.save(file).map_err(RunError::Picture)?;
+        }
+        Ok(manager)
     }
 
     fn frames_of_a_run(&self) -> u64 {
@@ -128,10 +131,15 @@ impl<'a> Session<'a> {
         })
     }
 
+    /// Takes all objects as they are, to be drawn.
+    fn take(&mut self, manager: &VeManager) {
+        self.view.show_next();
+        manager.visit(&mut |object| stages::draw(object, &mut self.view));
+    }
+
     /// Shows the environment as it is.
     fn stand_still(&mut self, manager: &VeManager) {
-        self.view.show_next();
-        manager.visit(&mut |object| dualframe_sim::stages::draw(object, &mut self.view));
+        self.take(manager);
         self.view.redraw();
         self.view.attend(IDLE);
         self.view.interrupt();
