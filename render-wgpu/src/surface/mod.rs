@@ -14,6 +14,7 @@ use std::sync::Arc;
 
 use dualframe_sim::geometry::{Mesh, Rigid, Vectors};
 use dualframe_sim::object::{Drawing, Object};
+use parry3d::shape::SharedShape;
 use wgpu::{BindGroup, Buffer, BufferSlice, Device, Queue, RenderPass, RenderPipeline};
 
 use self::frame_buffer::FrameBuffer;
@@ -37,6 +38,8 @@ pub(crate) struct Surfaces {
     makes: Vec<Make>,
     /// The makes by where their likeness is in memory; `None` for shapes that have no surface.
     by_address: HashMap<usize, Option<usize>>,
+    /// Those shapes, kept so that their addresses stay their own.
+    without_surface: Vec<SharedShape>,
     sent: FrameBuffer,
     /// Where in it the instances begin, in bytes.
     instances: usize,
@@ -49,6 +52,7 @@ impl Surfaces {
             pipelines: Pipelines::new(device, layouts, format),
             makes: Vec::new(),
             by_address: HashMap::new(),
+            without_surface: Vec::new(),
             sent: FrameBuffer::new(device, layouts),
             instances: 0,
             frame: 0,
@@ -68,6 +72,7 @@ impl Surfaces {
             self.makes.retain(|make| make.used >= oldest);
             // Found again at their next drawing.
             self.by_address.clear();
+            self.without_surface.clear();
             let addresses = self.makes.iter().map(Make::address).enumerate();
             self.by_address.extend(addresses.map(|(index, address)| (address, Some(index))));
         }
@@ -106,8 +111,14 @@ impl Surfaces {
         rigid: &Rigid,
     ) {
         let address = Arc::as_ptr(&rigid.shape.0).addr();
+        let is_new = !self.by_address.contains_key(&address);
         let make = self.make(address, || Make::rigid(device, layouts, &rigid.shape));
-        let Some(make) = make else { return };
+        let Some(make) = make else {
+            if is_new {
+                self.without_surface.push(rigid.shape.clone());
+            }
+            return;
+        };
         let (turned, place) = (rigid.pose.rotation.to_array(), rigid.pose.translation.to_array());
         self.add(make, object, 0, turned, place);
     }
