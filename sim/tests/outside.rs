@@ -154,14 +154,16 @@ fn diary(log: &Log) -> Scene {
 }
 
 /// What the first of them is to experience: what was said while frame f was swapped comes in frame
-/// f + 2, what was said before a run in its first frame, and both after the other object's letters.
+/// f + 2; what was said before the first run in its first frame, and before a later one in its second,
+/// since what was said before is still to come then; all after the other object's letters.
 fn days(frames: u64, runs: &[u64]) -> Vec<Event> {
     let mut expected = Vec::new();
     for frame in 0..frames {
         expected.extend(frame.checked_sub(1).map(Event::Posted));
         expected.extend(frame.checked_sub(2).map(Event::Told));
-        if runs.contains(&frame) {
-            expected.extend([1_000, 1_001].map(|number| Event::Told(number + frame)));
+        let began = if frame == 0 { Some(0) } else { Some(frame - 1).filter(|&first| first > 0) };
+        if let Some(first) = began.filter(|first| runs.contains(first)) {
+            expected.extend([1_000, 1_001].map(|number| Event::Told(number + first)));
         }
         expected.push(Event::Updated(frame));
     }
