@@ -91,12 +91,11 @@ fn refined(ray: Ray, first: f32, last: f32) -> f32 {
     return 0.5 * (before + behind);
 }
 
-// Where a ray first meets the surface between two of its places: `first` if it begins inside, −1 if
-// nowhere.
-fn march(ray: Ray, first: f32, last: f32) -> f32 {
+// Where a ray first meets the surface before `last`: 0 if it begins inside, −1 if nowhere.
+fn march(ray: Ray, last: f32, step: f32) -> f32 {
     let sides = sides();
-    var at = first;
-    var before = first;
+    var at = 0.0;
+    var before = 0.0;
     while at < last {
         let place = ray.origin + ray.direction * at;
         let brick = clamp(floor(place / grid.brick), vec3f(0.0), ceil(sides / grid.brick) - 1.0);
@@ -117,10 +116,13 @@ fn march(ray: Ray, first: f32, last: f32) -> f32 {
         // At least one step, so that every turn of the loop leads on.
         loop {
             if density(ray.origin + ray.direction * at) >= SURFACE {
-                return select(first, refined(ray, before, at), at > first);
+                if at > 0.0 {
+                    return refined(ray, before, at);
+                }
+                return 0.0;
             }
             before = at;
-            at += grid.step;
+            at += step;
             if at >= end {
                 break;
             }
@@ -160,8 +162,9 @@ struct Hit {
     is_some: bool,
 }
 
-// What is met on the way to `position`, from `way` before it; nothing nearer than `nearest` of it.
-fn met(position: vec3f, way: vec3f, nearest: f32) -> Hit {
+// What is met on the way to `position`, from `way` before it, in steps of so many voxels; nothing nearer
+// than `nearest` of the way.
+fn met(position: vec3f, way: vec3f, nearest: f32, step: f32) -> Hit {
     let whole = along_voxels(way);
     let voxels = length(whole);
     let direction = whole / voxels;
@@ -172,7 +175,7 @@ fn met(position: vec3f, way: vec3f, nearest: f32) -> Hit {
     // Ways are counted from the entry: from an eye far away, a step would be lost in rounding.
     let entry = max(within.x, (nearest - 1.0) * voxels);
     let ray = Ray(end + direction * entry, direction, inverse);
-    let at = march(ray, 0.0, -entry);
+    let at = march(ray, -entry, step);
     let back = (entry + at) / voxels;
     return Hit(position + way * back, ray.origin + direction * at, at == 0.0, at >= 0.0);
 }
@@ -187,7 +190,7 @@ fn fragment(side: Side) -> Pixel {
     let way = side.position - globals.eye;
     // The picture begins at a depth of 1, and depth is in inverse proportion to the way.
     let nearest = side.clip.z;
-    let hit = met(side.position, way, nearest);
+    let hit = met(side.position, way, nearest, grid.step);
     if !hit.is_some {
         discard;
     }
@@ -211,7 +214,8 @@ fn fragment(side: Side) -> Pixel {
 fn caster(side: Side) -> @builtin(frag_depth) f32 {
     // As far back as the box may reach.
     let reach = length(sides() * grid.spacing);
-    let hit = met(side.position, -globals.light * reach, 0.0);
+    // A shadow need not be as exact as what casts it.
+    let hit = met(side.position, -globals.light * reach, 0.0, 2.0 * grid.step);
     if !hit.is_some {
         discard;
     }
