@@ -69,6 +69,9 @@ pub enum GraphicsError {
         /// What its driver says.
         reason: String,
     },
+    /// There is no display, or it cannot be reached.
+    #[error("there is no display")]
+    NoDisplay,
     /// The window's surface cannot be drawn to.
     #[error("the window cannot be drawn to: {reason}")]
     Surface {

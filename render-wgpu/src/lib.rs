@@ -10,16 +10,19 @@
 //! | [`renderer`] | what draws, into any texture or offscreen |
 //! | [`camera`], [`look`] | from where, and how |
 //! | [`picture`] | finished pictures, PNG |
+//! | [`auxiliary`], [`pick`] | GPU work besides drawing (§9); what is under a pixel |
 //! | [`error`] | what can go wrong |
 //!
 //! The `dualframe` program is in this package too, behind the feature `app`, which is on by default.
 #![forbid(unsafe_code)]
 
+pub mod auxiliary;
 pub mod camera;
 pub mod error;
 mod globals;
 pub mod gpu;
 pub mod look;
+pub mod pick;
 pub mod picture;
 pub mod renderer;
 mod room;

@@ -8,12 +8,14 @@ use wgpu::{
     TextureUsages, TextureView,
 };
 
+use crate::auxiliary::{Auxiliary, Context, Units};
 use crate::camera::Camera;
 use crate::error::GraphicsError;
 use crate::globals::{Globals, View};
 use crate::gpu::Gpu;
 use crate::look::Look;
-use crate::picture::{Picture, Readback};
+use crate::pick::Picker;
+use crate::picture::{Picture, read_texture};
 use crate::room::Room;
 use crate::surface::{Layouts, Surfaces};
 use crate::target::{Format, Target, texture};
@@ -37,6 +39,8 @@ pub struct Painter {
     surfaces: Surfaces,
     volumes: Volumes,
     room: Room,
+    picker: Picker,
+    units: Units,
     format: Format,
     target: Target,
     /// The frame being drawn, from its first object on.
@@ -59,11 +63,14 @@ impl Painter {
         let device = &gpu.device;
         let format = Format { color, samples: look.quality.samples() };
         let layouts = Layouts::new(device);
+        let surfaces = Surfaces::new(device, &layouts, format);
         Ok(Self {
-            globals: Globals::new(device, &layouts, look.quality),
-            surfaces: Surfaces::new(device, &layouts, format),
+            globals: Globals::new(device, &layouts, look.quality, surfaces.buffer()),
+            surfaces,
             volumes: Volumes::new(device, &layouts, format, look.quality),
             room: Room::new(device, &layouts, format),
+            picker: Picker::new(device, &layouts),
+            units: Units::new(),
             target: Target::new(device, format, size.0, size.1),
             camera: Camera::around(&look.focus),
             layouts,
@@ -79,6 +86,12 @@ impl Painter {
     #[must_use]
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
+    }
+
+    /// Where GPU work besides drawing is submitted.
+    #[must_use]
+    pub fn auxiliary(&self) -> Auxiliary {
+        self.units.queue()
     }
 
     /// Draws at another size from the next frame on.
@@ -134,6 +147,11 @@ impl Painter {
         }
     }
 
+    /// Ends the frame without a picture.
+    pub fn discard(&mut self) {
+        self.view = None;
+    }
+
     /// Ends the frame: encodes how `picture`, a view of a texture of this size and format, is made of
     /// what was taken. Does nothing once the device has failed.
     pub fn paint(&mut self, encoder: &mut CommandEncoder, picture: &TextureView) {
@@ -146,10 +164,14 @@ impl Painter {
             return;
         }
         let Gpu { device, queue, .. } = &self.gpu;
-        self.globals.upload(queue, &view);
-        if let Err(error) = self.surfaces.upload(device, queue, &self.layouts) {
-            self.failure = Some(error);
-            return;
+        let numbers = view.numbers();
+        match self.surfaces.upload((device, queue), &self.layouts, numbers.as_words()) {
+            Ok(false) => {}
+            Ok(true) => self.globals.rebind(device, &self.layouts, self.surfaces.buffer()),
+            Err(error) => {
+                self.failure = Some(error);
+                return;
+            }
         }
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("shadows"),
@@ -170,6 +192,12 @@ impl Painter {
         }
         self.surfaces.paint(&mut pass, &self.globals.lit);
         self.volumes.paint(&mut pass, &self.globals.lit);
+        drop(pass);
+        let Self { gpu, surfaces, picker, units, .. } = self;
+        let size = (self.target.width, self.target.height);
+        let context = Context { gpu, view: &view, size, surfaces, picker };
+        units.finish(&context);
+        units.encode(&context, encoder);
     }
 }
 
@@ -189,7 +217,6 @@ pub struct Offscreen {
     pub painter: Painter,
     texture: Texture,
     view: TextureView,
-    readback: Readback,
     /// The frame submitted last: the device is at most one frame behind.
     submitted: Option<SubmissionIndex>,
 }
@@ -205,8 +232,7 @@ impl Offscreen {
         let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC;
         let texture = texture(device, "picture", OFFSCREEN_FORMAT, (width, height), 1, usage);
         let view = texture.create_view(&Default::default());
-        let readback = Readback::new(device, width, height);
-        Ok(Self { painter, texture, view, readback, submitted: None })
+        Ok(Self { painter, texture, view, submitted: None })
     }
 
     /// Reads the picture of the last frame.
@@ -217,12 +243,7 @@ impl Offscreen {
         if let Some(failure) = self.painter.failure() {
             return Err(failure);
         }
-        let Gpu { device, queue, .. } = self.painter.gpu();
-        let mut encoder = device.create_command_encoder(&Default::default());
-        self.readback.copy(&mut encoder, &self.texture);
-        queue.submit([encoder.finish()]);
-        let picture = self.readback.read(device);
-        picture.map_err(|error| self.painter.failure().unwrap_or(error))
+        read_texture(self.painter.gpu(), &self.texture)
     }
 }
 

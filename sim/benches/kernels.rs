@@ -143,7 +143,7 @@ fn entrants(topology: &Arc<Topology>) -> Vec<Entrant> {
             let advance = Box::new(move || {
                 for frame in 0..case.frames() {
                     for block in black_box(&mut blocks) {
-                        stages.update(frame, block, std::iter::empty(), &mut |_, _, _| {});
+                        stages.update(frame, block, |_| std::iter::empty(), &mut |_, _, _| {});
                     }
                 }
             });

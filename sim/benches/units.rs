@@ -121,7 +121,7 @@ fn idle(objects: usize) -> Scene {
         callback_budget: None,
         simd: Simd::detect(),
     };
-    Scene { objects: (0..objects).map(body).collect(), stages }
+    Scene::new((0..objects).map(body).collect(), stages)
 }
 
 /// Does nothing, in every frame; unlike scenery it is asked to.

@@ -15,10 +15,11 @@
 //! | Object Manager: maintains the objects and where they go | [`blocking`], [`block`] |
 //! | Object Interaction Manager: the complete set of interaction pairs | [`interaction::Rules`]; the queues are the core's |
 //! | thread pool | [`pool`] |
-//! | §6.2: messages | [`message`] |
+//! | §6.2: messages | [`message`]; from outside: [`mailbox`] |
 //! | §7.1.1: particles | [`scene`] |
 //! | §7.2: the pipeline and what it is compared with | [`executor`] |
 //! | §7–§8: Eqs. 2–4, Figs. 11–17, Table 1 | `experiment`, with the feature of that name |
+//! | (not in the paper) what each worker did when | [`timeline`] |
 //! | (not in the paper) kernels in vector instructions | [`simd`] |
 
 #![deny(unsafe_code)]
@@ -31,6 +32,7 @@ pub mod executor;
 pub mod experiment;
 pub mod geometry;
 pub mod interaction;
+pub mod mailbox;
 pub mod manager;
 pub mod message;
 mod mix;
@@ -42,3 +44,4 @@ pub mod scene;
 pub mod simd;
 pub mod stages;
 pub mod state;
+pub mod timeline;

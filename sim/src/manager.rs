@@ -12,11 +12,13 @@ use crate::executor::{
 use crate::executor::{
     OpenMpDynamicExecutor, OpenMpStaticExecutor, TbbForExecutor, TbbPipelineExecutor,
 };
-use crate::message::Message;
+use crate::mailbox::Mailbox;
 use crate::object::{Fault, Object, ObjectId};
 use crate::pool::{Pool, cores};
 use crate::render::Renderer;
 use crate::scene::Scene;
+use crate::stages::Stages;
+use crate::timeline::Timeline;
 
 /// How an environment is to be run. No setting changes a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,7 +55,7 @@ pub struct VeManager {
 }
 
 impl VeManager {
-    /// A manager of `scene`, before its first frame.
+    /// A manager of `scene`, before its next frame.
     ///
     /// # Errors
     /// A number of threads or of objects beyond its limit, threads that cannot be had.
@@ -109,9 +111,23 @@ impl VeManager {
         &self.pool
     }
 
-    /// Sends a message to an object, which processes it before its next update.
-    pub fn post(&mut self, to: ObjectId, message: Message) {
-        self.executor.post(to, message);
+    /// Where messages from outside are posted, by any thread at any time.
+    #[must_use]
+    pub fn mailbox(&self) -> Mailbox {
+        self.executor.mailbox().clone()
+    }
+
+    /// Lets the rules, or the numbers that all stages share, be changed between two runs: gravity and
+    /// the time step, say. The next frame is computed with what they are then.
+    pub fn change(&mut self, change: &mut dyn FnMut(&mut Stages)) {
+        self.executor.change(change);
+    }
+
+    /// Takes the environment out as it is after the last frame, with all messages that are under way; see
+    /// [`Executor::into_scene`]. A manager of it with other settings goes on to the same bits.
+    #[must_use]
+    pub fn into_scene(self) -> Scene {
+        self.executor.into_scene()
     }
 
     /// Shows every object in its present state, in no particular order.
@@ -134,6 +150,11 @@ impl VeManager {
     #[must_use]
     pub fn state_hash(&self) -> u64 {
         state_hash(&*self.executor)
+    }
+
+    /// Records on a timeline what workers do; see [`Executor::watch`].
+    pub fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.executor.watch(timeline);
     }
 
     /// What each worker spent its time on.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::object::Object;
+use crate::object::{Object, ObjectId};
 
 /// Something told to an object. It is processed immediately before the object's next update; what is
 /// posted in frame f's updates is processed in frame f+1's, ordered by sender and then by the order
@@ -24,12 +24,49 @@ pub enum Message {
         /// Of the springs to the centre.
         to_center: f32,
     },
+    /// Sets the damping of a mass–spring body's springs, in newton seconds per metre; negative or
+    /// non-finite values are ignored. Usually 0.02 for a particle; [`MassSpring`] says how much is
+    /// stable.
+    ///
+    /// [`MassSpring`]: crate::behavior::MassSpring
+    Damping(f32),
+    /// Pulls a mass–spring body by a damped spring from one node to a point fixed in space, in every
+    /// update from this one on until it is released or pulled otherwise: a person holds it.
+    ///
+    /// A resting body's node is off its target by about the force on the body over the stiffness: by its
+    /// weight's, say. The damping is critical for the whole body's mass on the spring. Any stiffness is
+    /// stable, for one of more than m/(2t²) acts like that, with the node's mass m and the frame's time
+    /// t: 288 N/m for a particle at 240 frames a second. Negative or non-finite values are ignored, and
+    /// nodes that do not exist or are held fast are not pulled.
+    Pull {
+        /// The node.
+        node: u32,
+        /// The point, in metres.
+        target: [f32; 3],
+        /// The spring's stiffness, in newtons per metre; usually 50 to 200 for a particle.
+        stiffness: f32,
+    },
+    /// Lets go of what was pulled.
+    Release,
     /// Switches the pull of gravity off (`true`) or on.
     Weightless(bool),
     /// Takes the object out of the environment for good.
     Remove,
     /// A message of the application's own making.
     Custom(Box<dyn Custom>),
+}
+
+/// A message under way.
+#[derive(Debug)]
+pub struct Letter {
+    /// The frame in whose update it is to be processed.
+    pub due: u64,
+    /// Whom it is for.
+    pub to: ObjectId,
+    /// Who sent it; [`ObjectId::HOST`] if it came from outside.
+    pub from: ObjectId,
+    /// What it says.
+    pub message: Message,
 }
 
 /// A message of the application's own making: the paper's base class with its *processMessage*

@@ -126,20 +126,19 @@ impl Stages {
 
     /// Updates the objects of a block.
     ///
-    /// The block must have [received] this frame's interaction results. `mail` is (to, from, message) for objects of this
-    /// block, for each in the order in which it is to be processed: by sender, then by order of
-    /// posting; messages to other objects are ignored. `post` is given (from, to, message) for each
-    /// message that an object sends.
+    /// The block must have [received] this frame's interaction results. `mail` gives the messages to an
+    /// object in the order in which they are to be processed: by sender, then by order of posting.
+    /// `post` is given (from, to, message) for each message that an object sends.
     ///
     /// An object whose callback panics, whose state is not finite afterwards, or that is over budget
     /// is quarantined.
     ///
     /// [received]: Block::receive
-    pub fn update<'m>(
+    pub fn update<'m, M: Iterator<Item = &'m Message>>(
         &self,
         frame: u64,
         block: &mut Block,
-        mail: impl Iterator<Item = (ObjectId, ObjectId, &'m Message)> + Clone,
+        mail: impl Fn(ObjectId) -> M,
         post: &mut dyn FnMut(ObjectId, ObjectId, Message),
     ) {
         let began = frame.is_multiple_of(FRAMES_PER_TIMING).then(Instant::now);
@@ -158,9 +157,7 @@ impl Stages {
                 object.quarantine(Fault { kind: FaultKind::Panicked, frame });
                 continue;
             }
-            let id = object.id();
-            let own_mail =
-                mail.clone().filter(move |&(to, ..)| to == id).map(|(.., message)| message);
+            let own_mail = mail(object.id());
             let given = Given { frame, place, segments, records, workspace: &mut *workspace };
             self.update_object(object, given, own_mail, post);
         }
@@ -230,7 +227,7 @@ impl Stages {
 }
 
 /// Draws an object, unless it is hidden or quarantined.
-pub(crate) fn draw(object: &Object, renderer: &mut dyn Renderer) {
+pub fn draw(object: &Object, renderer: &mut dyn Renderer) {
     if object.quarantined().is_none() && object.drawing != Drawing::Hidden {
         renderer.draw(object);
     }

@@ -59,7 +59,7 @@ fn gossip(log: &Log) -> Scene {
         object.refit();
         object
     };
-    Scene { objects: (0..SENDERS).map(talker).collect(), stages: no_rules() }
+    Scene::new((0..SENDERS).map(talker).collect(), no_rules())
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn next_frame_by_sender_and_sequence_before_the_update() {
                     executors(|| gossip(&log), grain, threads).swap_remove(index);
                 run(&mut *executor, 2);
                 let note = Note { log: Arc::clone(&log), posted: 99, from: 99, number: 99 };
-                executor.post(ObjectId(RECEIVER), Message::Custom(Box::new(note)));
+                executor.mailbox().post(ObjectId(RECEIVER), Message::Custom(Box::new(note)));
                 run(&mut *executor, 2);
                 assert_eq!(*log.lock().expect("nobody panics"), expected, "{name}, {threads}");
             }
@@ -105,11 +105,11 @@ fn impulse_and_weightlessness() {
     let mut stages = no_rules();
     stages.gravity = Vec3::NEG_Y * 24.0;
     let objects = (0..2).map(|id| point(id, common::springs(1.0))).collect();
-    let mut executor = serial(Scene { objects, stages });
-    executor.post(ObjectId(0), Message::Weightless(true));
+    let mut executor = serial(Scene::new(objects, stages));
+    executor.mailbox().post(ObjectId(0), Message::Weightless(true));
     // The node weighs 1 kg.
-    executor.post(ObjectId(0), Message::Impulse { node: 0, impulse: [3.0, 0.0, 0.0] });
-    executor.post(ObjectId(0), Message::Impulse { node: 1, impulse: [9.0, 0.0, 0.0] });
+    executor.mailbox().post(ObjectId(0), Message::Impulse { node: 0, impulse: [3.0, 0.0, 0.0] });
+    executor.mailbox().post(ObjectId(0), Message::Impulse { node: 1, impulse: [9.0, 0.0, 0.0] });
     run(&mut executor, 10);
     assert_eq!(velocity(&executor, 0), Vec3::X * 3.0);
     assert!((velocity(&executor, 1) - Vec3::NEG_Y).length() < 1e-6, "24 m/s² over 10/240 s");
@@ -120,7 +120,7 @@ fn stiffness() {
     let energy_after = |message: Option<Message>| {
         let mut executor = serial(particles(2, false, true));
         run(&mut executor, 1);
-        message.into_iter().for_each(|message| executor.post(ObjectId(0), message));
+        message.into_iter().for_each(|message| executor.mailbox().post(ObjectId(0), message));
         run(&mut executor, 20).1
     };
     let set = |between_nodes, to_center| Some(Message::Stiffness { between_nodes, to_center });
@@ -167,6 +167,6 @@ fn a_scripted_object_needs_no_interactions() {
 fn hidden_objects_are_not_drawn() {
     let mut objects = vec![point(0, Fixed), point(1, Fixed)];
     objects[1].drawing = Drawing::Hidden;
-    let (_, _, renderer) = run(&mut serial(Scene { objects, stages: no_rules() }), 5);
+    let (_, _, renderer) = run(&mut serial(Scene::new(objects, no_rules())), 5);
     assert_eq!(renderer.draws(), 5);
 }

@@ -36,7 +36,7 @@ fn pair_of_nodes(stiffness: f32, time_step: f32, substeps: u32) -> Scene {
     let object = Object::new(ObjectId(0), Group(0), Geometry::Mesh(mesh), behavior);
     let mut stages = no_rules();
     stages.time_step = time_step;
-    Scene { objects: vec![object], stages }
+    Scene::new(vec![object], stages)
 }
 
 /// The measured period of the pair, in seconds: over `periods` of them, from upward crossings of the
@@ -92,7 +92,7 @@ fn an_irregular_body_at_rest_stays_there() {
     let mesh = Mesh::new(Arc::new(topology), &nodes, &[1.0; 9], 0.0).expect("nine masses");
     let behavior = MassSpring::new(50.0, 1.0, 3).expect("a stiffness");
     let object = Object::new(ObjectId(0), Group(0), Geometry::Mesh(mesh), behavior);
-    let mut executor = serial(Scene { objects: vec![object], stages: no_rules() });
+    let mut executor = serial(Scene::new(vec![object], no_rules()));
     run(&mut executor, 50);
     each_mesh(&executor, |mesh| {
         let ways = mesh.positions.iter().zip(&nodes).map(|(now, then)| now.distance(*then));
@@ -109,7 +109,7 @@ fn held_nodes_do_not_move() {
     let object = Object::new(ObjectId(0), Group(0), Geometry::Mesh(mesh), behavior);
     let mut stages = no_rules();
     stages.gravity = Vec3::NEG_Y * 9.81;
-    let mut executor = serial(Scene { objects: vec![object], stages });
+    let mut executor = serial(Scene::new(vec![object], stages));
     run(&mut executor, 1);
     // In the first frame the spring is at rest: the other node falls freely.
     each_mesh(&executor, |mesh| {

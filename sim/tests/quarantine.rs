@@ -113,7 +113,7 @@ fn told_to_leave() {
     let expected = hash_of_absence();
     for (name, mut executor) in executors(|| crowd(|_| {}), Grain::Spatial, 2) {
         run(&mut *executor, FATAL_FRAME);
-        executor.post(CULPRIT, Message::Remove);
+        executor.mailbox().post(CULPRIT, Message::Remove);
         run(&mut *executor, FRAMES - FATAL_FRAME);
         let gone = [(CULPRIT, FaultKind::Removed, FATAL_FRAME)];
         assert_eq!(quarantined(&*executor), gone, "{name}");
@@ -133,7 +133,7 @@ fn an_update_over_budget() {
     let quarantined_with = |budget| {
         let mut stages = no_rules();
         stages.callback_budget = budget;
-        let mut executor = serial(Scene { objects: vec![point(0, Acting(slow))], stages });
+        let mut executor = serial(Scene::new(vec![point(0, Acting(slow))], stages));
         run(&mut executor, FATAL_FRAME + 1);
         quarantined(&executor)
     };
@@ -164,7 +164,7 @@ fn a_panic_in_an_interaction_takes_both() {
         rules.model(Group(0), Group(0), pair).expect("the first rule");
         let mut stages = no_rules();
         stages.rules = rules;
-        Scene { objects: (0..3).map(|id| point(id, common::springs(1.0))).collect(), stages }
+        Scene::new((0..3).map(|id| point(id, common::springs(1.0))).collect(), stages)
     };
     for (name, mut executor) in executors(scene, Grain::Spatial, 2) {
         let (counts, ..) = run(&mut *executor, 2);

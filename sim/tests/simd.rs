@@ -130,7 +130,7 @@ fn stages(simd: Simd) -> Stages {
 
 /// What becomes of objects in five frames, in blocks of so many.
 fn outcome(objects: Vec<Object>, stages: Stages, size: usize) -> Vec<Object> {
-    let mut reference = Reference::new(Scene { objects, stages }, size);
+    let mut reference = Reference::new(Scene::new(objects, stages), size);
     for _ in 0..5 {
         reference.step();
     }

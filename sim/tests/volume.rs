@@ -31,7 +31,7 @@ fn drilled(id: u32, top: f32) -> Object {
 }
 
 fn two_pieces() -> Scene {
-    Scene { objects: vec![drilled(0, 44.0), drilled(1, 40.0)], stages: no_rules() }
+    Scene::new(vec![drilled(0, 44.0), drilled(1, 40.0)], no_rules())
 }
 
 /// What a graphics device would hold of each volume, and the revision it is of.

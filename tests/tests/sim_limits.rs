@@ -113,7 +113,9 @@ fn letters_from_outside_make_room_for_themselves() {
         let mut manager = VeManager::new(scene(5), settings).expect("valid settings");
         for node in 0..30_000 {
             let impulse = [1e-6, 2e-6, -1e-6];
-            manager.post(ObjectId(node % 5), Message::Impulse { node: node % 42, impulse });
+            manager
+                .mailbox()
+                .post(ObjectId(node % 5), Message::Impulse { node: node % 42, impulse });
         }
         let outcome = manager.run(20, &mut NullRenderer::new(), &mut |_| ());
         outcome.expect("the letters fit");

@@ -14,6 +14,10 @@ use dualframe_sim::simd::{Instructions, Simd};
 
 /// The most frames of one run: each takes 24 bytes of the report.
 const MAX_FRAMES: u64 = 10_000_000;
+/// The greatest width and height that may be asked for; adapters usually allow 8,192 or 16,384.
+const MAX_PIXELS: u32 = 16_384;
+/// Frames of a run without a window.
+const USUAL_FRAMES: u64 = 800;
 /// The most particles whose every pair can be modelled; the six walls come on top.
 const MAX_PAIRWISE: usize = Blocking::MAX_PAIRWISE_OBJECTS - 6;
 
@@ -87,10 +91,10 @@ pub(super) struct Particles {
     #[arg(long, value_name = "N", default_value_t = 300, value_parser = parse_objects,
           help = format!("Number of particles, 1 to {}", ParticleScene::MAX_OBJECTS))]
     pub(super) objects: usize,
-    #[arg(long, value_name = "N", default_value_t = 800,
-          value_parser = clap::value_parser!(u64).range(1..=MAX_FRAMES),
-          help = format!("Number of frames, 1 to {MAX_FRAMES}"))]
-    pub(super) frames: u64,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_FRAMES),
+          help = format!("Number of frames, 1 to {MAX_FRAMES}; if not given, {USUAL_FRAMES}, or in a \
+                          window until it is closed"))]
+    pub(super) frames: Option<u64>,
     #[arg(long, value_name = "N", default_value_t = cores().min(MAX_THREADS),
           value_parser = parse_threads,
           help = format!("Number of threads, 1 to {MAX_THREADS}; all cores if not given"))]
@@ -116,18 +120,30 @@ pub(super) struct Particles {
           help = format!("Vector instructions of the kernels, {}; the widest that the machine has \
                           if not given", Instructions::ALL.map(Instructions::name).join(" or ")))]
     simd: Option<Simd>,
-    /// Show a window (not there yet).
+    /// Show a window, which is what happens where there is a display
     #[arg(long, conflicts_with_all = ["headless", "offscreen"])]
-    window: bool,
-    /// Run without a picture (as it does now).
+    pub(super) window: bool,
+    /// Run without a window
     #[arg(long, conflicts_with = "offscreen")]
     headless: bool,
-    /// Draw without a window (not there yet).
+    /// Draw every frame without a window
     #[arg(long)]
-    offscreen: bool,
-    /// Write a picture of the last frame (not there yet).
+    pub(super) offscreen: bool,
+    /// Write a picture of the last frame
     #[arg(long, value_name = "FILE.png")]
-    picture: Option<PathBuf>,
+    pub(super) picture: Option<PathBuf>,
+    /// Write a picture of every frame into a folder, which is made if it is not there
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["window", "headless"])]
+    pub(super) frames_out: Option<PathBuf>,
+    /// Width and height of window and pictures, in pixels
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
+    pub(super) size: (u32, u32),
+    /// A part of the graphics adapter's name
+    #[arg(long, value_name = "NAME")]
+    pub(super) adapter: Option<String>,
+    /// Write what each worker did in the last seconds, for chrome://tracing or ui.perfetto.dev
+    #[arg(long, value_name = "FILE")]
+    pub(super) trace: Option<PathBuf>,
     /// Write the report as JSON.
     #[arg(long, value_name = "FILE")]
     pub(super) json: Option<PathBuf>,
@@ -155,16 +171,19 @@ impl Particles {
         self.simd.unwrap_or_else(Simd::detect)
     }
 
+    /// The number of frames of a run without a window.
+    pub(super) fn frames(&self) -> u64 {
+        self.frames.unwrap_or(USUAL_FRAMES)
+    }
+
+    /// Whether a window is to be shown if there can be one: nothing else was asked for.
+    pub(super) fn prefers_window(&self) -> bool {
+        let pictures = self.picture.is_some() || self.frames_out.is_some();
+        self.window || !(self.headless || self.offscreen || pictures)
+    }
+
     /// What fits no single argument.
     fn check(self) -> Result<Self, String> {
-        let missing = [
-            (self.window, "--window"),
-            (self.offscreen, "--offscreen"),
-            (self.picture.is_some(), "--picture"),
-        ];
-        if let Some((_, name)) = missing.iter().find(|(given, _)| *given) {
-            return Err(format!("{name} is not there yet: this version draws no pictures"));
-        }
         if self.grain() == Grain::Pairwise && self.objects > MAX_PAIRWISE {
             let objects = self.objects;
             return Err(format!(
@@ -205,6 +224,14 @@ fn executor_names() -> String {
 fn parse_number(text: &str, most: usize) -> Result<usize, String> {
     let number = text.parse().ok().filter(|number| (1..=most).contains(number));
     number.ok_or_else(|| format!("not a whole number from 1 to {most}"))
+}
+
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let (width, height) = text.split_once('x').ok_or("not like 1280x720")?;
+    let pixels = |text: &str| text.parse().ok().filter(|pixels| (1..=MAX_PIXELS).contains(pixels));
+    pixels(width)
+        .zip(pixels(height))
+        .ok_or_else(|| format!("not two whole numbers from 1 to {MAX_PIXELS}"))
 }
 
 fn parse_simd(text: &str) -> Result<Simd, String> {

@@ -9,35 +9,41 @@ use super::AllocationCounter;
 /// Frames after which allocations are counted, if there are twice as many; else after half of them,
 /// but at least one.
 const WARM_UP: u64 = 32;
+/// Frames that are kept of a run whose length nobody knows: those of a window's first hour or so.
+const MOST_KEPT: u64 = 1 << 20;
 
 /// A run's frames.
 pub(super) struct Measure<'a> {
     began: Instant,
     last: Instant,
-    frames: u64,
-    /// Nanoseconds from swap to swap.
+    warm_up: u64,
+    /// Frames done.
+    pub(super) frames: u64,
+    /// Nanoseconds from swap to swap; of a window's frames the first ones'.
     pub(super) frame_times: Vec<u64>,
     pub(super) candidates: Vec<u32>,
     pub(super) collisions: Vec<u32>,
     count: AllocationCounter<'a>,
     at_warm_up: usize,
-    pub(super) allocations: usize,
+    at_last: usize,
 }
 
 impl<'a> Measure<'a> {
-    pub(super) fn new(frames: u64, count: AllocationCounter<'a>) -> Self {
-        let room = frames as usize;
+    /// Of so many frames, if that is known.
+    pub(super) fn new(frames: Option<u64>, count: AllocationCounter<'a>) -> Self {
+        let room = frames.unwrap_or(MOST_KEPT) as usize;
         let now = Instant::now();
         Self {
             began: now,
             last: now,
-            frames,
+            warm_up: frames.map_or(WARM_UP, |frames| WARM_UP.min(frames / 2).max(1)),
+            frames: 0,
             frame_times: Vec::with_capacity(room),
             candidates: Vec::with_capacity(room),
             collisions: Vec::with_capacity(room),
             count,
             at_warm_up: 0,
-            allocations: 0,
+            at_last: 0,
         }
     }
 
@@ -49,15 +55,16 @@ impl<'a> Measure<'a> {
 
     /// A frame was swapped.
     pub(super) fn frame(&mut self, record: &FrameRecord) {
-        self.frame_times.push((record.swapped - self.last).as_nanos() as u64);
-        self.candidates.push(u32::try_from(record.pairs.candidates).unwrap_or(u32::MAX));
-        self.collisions.push(u32::try_from(record.pairs.collisions).unwrap_or(u32::MAX));
-        self.last = record.swapped;
-        if record.frame + 1 == WARM_UP.min(self.frames / 2).max(1) {
-            self.at_warm_up = (self.count)();
+        self.frames += 1;
+        if self.frame_times.len() < self.frame_times.capacity() {
+            self.frame_times.push((record.swapped - self.last).as_nanos() as u64);
+            self.candidates.push(u32::try_from(record.pairs.candidates).unwrap_or(u32::MAX));
+            self.collisions.push(u32::try_from(record.pairs.collisions).unwrap_or(u32::MAX));
         }
-        if record.frame + 1 == self.frames {
-            self.allocations += (self.count)() - self.at_warm_up;
+        self.last = record.swapped;
+        self.at_last = (self.count)();
+        if self.frames == self.warm_up {
+            self.at_warm_up = self.at_last;
         }
     }
 
@@ -66,6 +73,11 @@ impl<'a> Measure<'a> {
         let before = (self.count)();
         work();
         self.at_warm_up += (self.count)() - before;
+    }
+
+    /// Heap allocations from the warm-up's end to the last frame.
+    pub(super) fn allocations(&self) -> usize {
+        self.at_last.saturating_sub(self.at_warm_up)
     }
 
     /// Seconds from the start to the last swap.

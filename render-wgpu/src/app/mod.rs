@@ -4,18 +4,23 @@ mod args;
 mod experiment;
 mod measure;
 mod particles;
+mod pictures;
 mod report;
+mod window;
 
 use std::error::Error;
 use std::process::ExitCode;
 
 use self::args::{ExperimentArgs, Outcome, Particles};
+use self::particles::RunError;
 
 /// Counts the heap allocations made so far.
 pub(crate) type AllocationCounter<'a> = &'a dyn Fn() -> usize;
 
 /// Status of a run that was not sound.
 const UNSOUND: u8 = 1;
+/// Status of a run that could not be drawn as asked for.
+const NO_PICTURE: u8 = 3;
 /// Status of a bad argument or file.
 const BAD_ARGUMENT: u8 = 2;
 
@@ -45,8 +50,10 @@ fn run_particles(particles: &Particles, allocations: AllocationCounter<'_>) -> E
         Ok(json) => json,
         Err(line) => return fail(&line, BAD_ARGUMENT),
     };
-    let report = match particles::run(particles, allocations) {
+    let note = |line: &str| eprintln!("dualframe: {line}");
+    let report = match particles::run(particles, allocations, &note) {
         Ok(report) => report,
+        Err(RunError::Graphics(error)) => return fail(&with_causes(&error), NO_PICTURE),
         Err(error) => return fail(&with_causes(&error), UNSOUND),
     };
     report.print();

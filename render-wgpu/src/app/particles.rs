@@ -1,20 +1,31 @@
 //! `dualframe particles`.
 
-use dualframe_sim::executor::{ExecutorError, ExecutorKind};
+use std::io;
+use std::sync::Arc;
+
+use dualframe_render_wgpu::error::GraphicsError;
+use dualframe_sim::executor::{Entry, ExecutorError, ExecutorKind, FrameRecord};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::object::FaultKind;
 use dualframe_sim::render::NullRenderer;
 use dualframe_sim::scene::{ParticleScene, Scene, SceneError};
+use dualframe_sim::timeline::Timeline;
 use indicatif::{ProgressBar, ProgressStyle};
 use thiserror::Error;
 
 use super::AllocationCounter;
 use super::args::Particles;
 use super::measure::Measure;
+use super::pictures::Pictures;
 use super::report::{FrameMilliseconds, Report};
+use super::window::{Session, most_threads};
 
 /// Frames that are run serially too, to say what the speed-up is.
 const REFERENCE_FRAMES: u64 = 48;
+/// Spans of a worker that its timeline keeps for a trace; usually 65,536, some seconds of work.
+const TRACED_SPANS: usize = 1 << 16;
+/// Spans of a worker that its timeline keeps for a window; usually 4,096, more than is shown.
+const SHOWN_SPANS: usize = 1 << 12;
 
 /// Why a run failed.
 #[derive(Debug, Error)]
@@ -23,43 +34,121 @@ pub(super) enum RunError {
     Scene(#[from] SceneError),
     #[error(transparent)]
     Executor(#[from] ExecutorError),
+    #[error(transparent)]
+    Graphics(#[from] GraphicsError),
+    #[error("a picture cannot be written")]
+    Picture(#[source] io::Error),
+    #[error("the trace cannot be written")]
+    Trace(#[source] io::Error),
 }
 
-/// Runs the environment as `args` say.
-pub(super) fn run(args: &Particles, count: AllocationCounter<'_>) -> Result<Report, RunError> {
-    let scene = ParticleScene {
-        seed: args.seed,
-        gravity: args.gravity,
-        ..ParticleScene::new(args.objects)
+/// The environment that `args` describe, with another number of particles.
+pub(super) fn scene_of(args: &Particles, objects: usize) -> ParticleScene {
+    ParticleScene { seed: args.seed, gravity: args.gravity, ..ParticleScene::new(objects) }
+}
+
+/// How `args` want it to be run, apart from what a window can change.
+pub(super) fn settings_of(
+    args: &Particles,
+    executor: ExecutorKind,
+    threads: usize,
+    entry: Entry,
+) -> Settings {
+    Settings { executor, threads, pinned: false, grain: args.grain(), entry }
+}
+
+fn build(args: &Particles) -> Result<Scene, SceneError> {
+    let mut scene = scene_of(args, args.objects).build()?;
+    scene.stages.simd = args.simd();
+    Ok(scene)
+}
+
+/// Runs the environment as `args` say. `note` is told what the person at the terminal should know.
+pub(super) fn run(
+    args: &Particles,
+    count: AllocationCounter<'_>,
+    note: &dyn Fn(&str),
+) -> Result<Report, RunError> {
+    let settings = settings_of(args, args.executor, args.threads, args.entry());
+    let spans = if args.trace.is_some() { TRACED_SPANS } else { SHOWN_SPANS };
+    // One more for whoever renders beside rayon's workers.
+    let workers = args.threads.max(most_threads()) + 1;
+    let timeline = Arc::new(Timeline::new(workers, spans));
+    let window = open_window(args, &timeline, note)?;
+    let mut manager = VeManager::new(build(args)?, settings)?;
+    if window.is_some() || args.trace.is_some() {
+        manager.watch(Arc::clone(&timeline));
+    }
+    let report = match window {
+        Some(window) => {
+            let mut measure = Measure::new(args.frames, count);
+            measure.start();
+            let manager = window.run(manager, args.frames, &mut |record| measure.frame(record))?;
+            report(args, &manager, &measure, None)
+        }
+        None => run_unwatched(args, manager, settings, count)?,
     };
-    let build = || {
-        let mut scene = scene.build()?;
-        scene.stages.simd = args.simd();
-        Ok::<_, SceneError>(scene)
-    };
-    let settings = Settings {
-        executor: args.executor,
-        threads: args.threads,
-        pinned: false,
-        grain: args.grain(),
-        entry: args.entry(),
-    };
-    let mut manager = VeManager::new(build()?, settings)?;
-    let mut measure = Measure::new(args.frames, count);
-    let bar = progress_bar(args.frames);
+    if let Some(file) = &args.trace {
+        write_trace(&timeline, file).map_err(RunError::Trace)?;
+    }
+    Ok(report)
+}
+
+/// A window, where one is wanted and possible.
+fn open_window<'a>(
+    args: &'a Particles,
+    timeline: &Arc<Timeline>,
+    note: &dyn Fn(&str),
+) -> Result<Option<Session<'a>>, RunError> {
+    if !args.prefers_window() {
+        return Ok(None);
+    }
+    match Session::open(args, Arc::clone(timeline)) {
+        Ok(window) => Ok(Some(window)),
+        Err(error) if args.window => Err(error.into()),
+        Err(error) => {
+            note(&format!(
+                "running without a window, since {error}; --picture FILE.png draws without one"
+            ));
+            Ok(None)
+        }
+    }
+}
+
+/// Runs without a window.
+fn run_unwatched(
+    args: &Particles,
+    mut manager: VeManager,
+    settings: Settings,
+    count: AllocationCounter<'_>,
+) -> Result<Report, RunError> {
+    let frames = args.frames();
+    let mut pictures = Pictures::new(args, scene_of(args, args.objects).room())?;
+    let mut measure = Measure::new(Some(frames), count);
+    let bar = progress_bar(frames);
     measure.start();
-    manager.run(args.frames, &mut NullRenderer::new(), &mut |record| {
+    let mut on_frame = |record: &FrameRecord| {
         measure.frame(record);
         if !bar.is_hidden() {
             measure.beside(|| bar.inc(1));
         }
-    })?;
+    };
+    match &mut pictures {
+        Some(pictures) => manager.run(frames, pictures, &mut on_frame)?,
+        None => manager.run(frames, &mut NullRenderer::new(), &mut on_frame)?,
+    }
     bar.finish_and_clear();
+    let is_drawn = pictures.is_some();
+    if let Some(pictures) = pictures {
+        pictures.finish()?;
+    }
     let speed_up = match settings.executor {
-        ExecutorKind::Serial => 1.0,
+        // Drawing is no part of the serial run.
+        _ if is_drawn => None,
+        ExecutorKind::Serial => Some(1.0),
         _ => {
-            serial_seconds(build()?, settings, args.frames)?
-                / measure.seconds_of_first(REFERENCE_FRAMES)
+            let serial = serial_seconds(build(args)?, settings, frames)?;
+            Some(serial / measure.seconds_of_first(REFERENCE_FRAMES))
         }
     };
     Ok(report(args, &manager, &measure, speed_up))
@@ -75,21 +164,33 @@ fn progress_bar(frames: u64) -> ProgressBar {
     }
 }
 
+fn write_trace(timeline: &Timeline, file: &std::path::Path) -> io::Result<()> {
+    let mut writer = io::BufWriter::new(std::fs::File::create(file)?);
+    timeline.write_chrome_trace(&mut writer)?;
+    io::Write::flush(&mut writer)
+}
+
 /// Seconds that the serial executor takes for the first frames of the same environment.
 fn serial_seconds(scene: Scene, settings: Settings, frames: u64) -> Result<f64, RunError> {
     let settings = Settings { executor: ExecutorKind::Serial, threads: 1, ..settings };
     let mut manager = VeManager::new(scene, settings)?;
     let frames = frames.min(REFERENCE_FRAMES);
-    let mut measure = Measure::new(frames, &|| 0);
+    let mut measure = Measure::new(Some(frames), &|| 0);
     measure.start();
     manager.run(frames, &mut NullRenderer::new(), &mut |record| measure.frame(record))?;
     Ok(measure.seconds())
 }
 
-fn report(args: &Particles, manager: &VeManager, measure: &Measure<'_>, speed_up: f64) -> Report {
-    let (mut nodes, mut springs) = (0, 0);
+fn report(
+    args: &Particles,
+    manager: &VeManager,
+    measure: &Measure<'_>,
+    speed_up: Option<f64>,
+) -> Report {
+    let (mut objects, mut nodes, mut springs) = (0, 0, 0);
     manager.visit(&mut |object| {
         if let Some(mesh) = object.geometry.as_mesh() {
+            objects += 1;
             nodes += mesh.positions.len();
             springs += mesh.topology().spring_count();
         }
@@ -103,21 +204,21 @@ fn report(args: &Particles, manager: &VeManager, measure: &Measure<'_>, speed_up
         executor: args.executor.name(),
         threads: args.threads,
         simd: args.simd().instructions().name(),
-        objects: args.objects,
+        objects,
         nodes,
         springs,
-        frames: args.frames,
+        frames: measure.frames,
         seed: args.seed,
         gravity: args.gravity,
         frames_in_flight: args.frames_in_flight,
         seconds,
-        fps: args.frames as f64 / seconds,
+        fps: measure.frames as f64 / seconds.max(f64::MIN_POSITIVE),
         speed_up,
         frame_ms: FrameMilliseconds::of(&measure.frame_times),
         candidates: measure.candidates.clone(),
         collisions: measure.collisions.clone(),
         state_hash: format!("{:016x}", manager.state_hash()),
-        allocations: measure.allocations,
+        allocations: measure.allocations(),
         stage_seconds: manager.stage_seconds().iter().map(Into::into).collect(),
         quarantined: quarantined.iter().map(Into::into).collect(),
         non_finite,

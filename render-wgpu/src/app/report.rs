@@ -24,8 +24,8 @@ pub(super) struct Report {
     pub(super) frames_in_flight: u8,
     pub(super) seconds: f64,
     pub(super) fps: f64,
-    /// Over the serial executor, on the same first frames.
-    pub(super) speed_up: f64,
+    /// Over the serial executor, on the same first frames; not where frames are drawn.
+    pub(super) speed_up: Option<f64>,
     pub(super) frame_ms: FrameMilliseconds,
     pub(super) candidates: Vec<u32>,
     pub(super) collisions: Vec<u32>,
@@ -133,8 +133,9 @@ impl Report {
             self.nodes, self.springs, self.seed
         )?;
         writeln!(out, "{executor} on {threads} threads ({simd}): {fps:.1} fps, {seconds:.3} s")?;
-        let speed_up = self.speed_up;
-        writeln!(out, "speed-up over the serial run: {speed_up:.2} (first frames of both)")?;
+        if let Some(speed_up) = self.speed_up {
+            writeln!(out, "speed-up over the serial run: {speed_up:.2} (first frames of both)")?;
+        }
         let FrameMilliseconds { p50, p99, p999, max } = frame_ms;
         writeln!(
             out,

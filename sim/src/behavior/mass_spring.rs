@@ -5,6 +5,7 @@ use std::hash::Hasher;
 use glam::Vec3;
 use thiserror::Error;
 
+use super::pull::Pull;
 use super::spring_kernel::Springs;
 use super::{Behavior, Input, batch};
 use crate::geometry::{Geometry, Mesh, Spring};
@@ -46,6 +47,7 @@ pub struct MassSpring {
     damping: f32,
     substeps: u32,
     weightless: bool,
+    pull: Option<Pull>,
 }
 
 impl MassSpring {
@@ -60,7 +62,14 @@ impl MassSpring {
         if substeps == 0 {
             return Err(MassSpringError::NoSubsteps);
         }
-        Ok(Self { stiffness, center_stiffness: stiffness, damping, substeps, weightless: false })
+        Ok(Self {
+            stiffness,
+            center_stiffness: stiffness,
+            damping,
+            substeps,
+            weightless: false,
+            pull: None,
+        })
     }
 
     /// The same with another stiffness, in newtons per metre, for the springs to the centre, which
@@ -109,7 +118,7 @@ fn check(what: &'static str, value: f32) -> Result<(), MassSpringError> {
 }
 
 impl MassSpring {
-    /// Begins an update: what the frame's contacts do. What is left are the springs.
+    /// Begins an update: what the frame's contacts do, and whoever pulls. What is left are the springs.
     pub(super) fn begin(&self, mesh: &mut Mesh, input: &Input<'_>) -> Springs {
         for contact in input.contacts() {
             let impulse = Vec3::from_array(contact.impulse);
@@ -117,6 +126,9 @@ impl MassSpring {
                 Contact::BODY => mesh.apply_body_impulse(impulse),
                 node => mesh.apply_impulse(node, impulse),
             }
+        }
+        if let Some(pull) = self.pull {
+            pull.apply(mesh, input.time_step);
         }
         Springs {
             damping: self.damping,
@@ -147,15 +159,25 @@ impl Behavior for MassSpring {
                     }
                 }
             }
+            Message::Damping(damping) if check("the damping", damping).is_ok() => {
+                self.damping = damping;
+            }
+            Message::Pull { node, target, stiffness } => {
+                self.pull = Pull::new(node, target, stiffness).or(self.pull);
+            }
+            Message::Release => self.pull = None,
             Message::Weightless(weightless) => self.weightless = weightless,
             _ => {}
         }
     }
 
     fn hash_state(&self, hasher: &mut dyn Hasher) {
-        for value in [self.stiffness, self.center_stiffness] {
+        for value in [self.stiffness, self.center_stiffness, self.damping] {
             hasher.write(&value.to_le_bytes());
         }
         hasher.write_u8(u8::from(self.weightless));
+        if let Some(pull) = self.pull {
+            pull.hash_state(hasher);
+        }
     }
 }

@@ -4,6 +4,7 @@ mod abreast;
 pub(crate) mod batch;
 mod fixed;
 mod mass_spring;
+mod pull;
 mod scripted;
 #[allow(unsafe_code)]
 mod spring_kernel;

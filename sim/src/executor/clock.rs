@@ -1,20 +1,12 @@
 //! What workers spend their time on (Table 1).
 
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-/// A stage of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// Finding the pairs that may touch.
-    BroadPhase,
-    /// Detection and response.
-    Interaction,
-    /// Updates of objects.
-    Update,
-    /// Drawing and swapping.
-    Render,
-}
+pub use dualframe_core::stage::Stage;
+
+use crate::timeline::Timeline;
 
 /// Seconds that one worker spent in each stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,22 +25,32 @@ pub struct StageSeconds {
 
 /// A worker's clock. Others may read it at any time.
 #[derive(Debug, Default)]
-pub(super) struct Clock([AtomicU64; 4]);
+pub(super) struct Clock {
+    nanoseconds: [AtomicU64; 4],
+    /// Where the worker's spans are recorded, and its number there.
+    track: OnceLock<(Arc<Timeline>, usize)>,
+}
 
 impl Clock {
-    /// Counts the time until the guard is dropped towards a stage.
-    pub(super) fn time(&self, stage: Stage) -> Timer<'_> {
-        Timer { clock: self, stage, began: Instant::now() }
+    /// Records on a timeline, as worker number `worker`, what is timed from now on.
+    pub(super) fn watch(&self, timeline: Arc<Timeline>, worker: usize) {
+        self.track.get_or_init(|| (timeline, worker));
+    }
+
+    /// Counts the time until the guard is dropped towards a stage, which works on `frame`.
+    pub(super) fn time(&self, stage: Stage, frame: u64) -> Timer<'_> {
+        Timer { clock: self, stage, frame, began: Instant::now() }
     }
 
     /// Counts some time towards a stage.
     pub(super) fn add(&self, stage: Stage, time: Duration) {
-        self.0[stage as usize].fetch_add(time.as_nanos() as u64, Ordering::Relaxed);
+        self.nanoseconds[stage as usize].fetch_add(time.as_nanos() as u64, Ordering::Relaxed);
     }
 
     /// What was counted, within so much time of running.
     pub(super) fn seconds(&self, running: Duration) -> StageSeconds {
-        let seconds = |stage: Stage| self.0[stage as usize].load(Ordering::Relaxed) as f64 * 1e-9;
+        let seconds =
+            |stage: Stage| self.nanoseconds[stage as usize].load(Ordering::Relaxed) as f64 * 1e-9;
         let mut result = StageSeconds {
             broad_phase: seconds(Stage::BroadPhase),
             interaction: seconds(Stage::Interaction),
@@ -66,11 +68,16 @@ impl Clock {
 pub(super) struct Timer<'a> {
     clock: &'a Clock,
     stage: Stage,
+    frame: u64,
     began: Instant,
 }
 
 impl Drop for Timer<'_> {
     fn drop(&mut self) {
-        self.clock.add(self.stage, self.began.elapsed());
+        let ended = Instant::now();
+        self.clock.add(self.stage, ended - self.began);
+        if let Some((timeline, worker)) = self.clock.track.get() {
+            timeline.record(*worker, self.stage, self.frame, self.began, ended);
+        }
     }
 }

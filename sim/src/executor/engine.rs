@@ -1,6 +1,6 @@
 //! The stages up to update as parallel loops.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::clock::{Clock, Stage, StageSeconds, Timer};
@@ -14,11 +14,11 @@ use crate::geometry::Bounds;
 use crate::interaction::Scratch;
 use crate::scene::Scene;
 use crate::stages::PairCount;
+use crate::timeline::Timeline;
 
 /// An environment that is computed loop by loop.
 pub(super) struct Engine {
     pub(super) world: World,
-    pub(super) mail: Mail,
     pub(super) workers: Vec<Worker>,
     pub(super) frame: u64,
     bounds: Vec<Bounds>,
@@ -42,13 +42,13 @@ impl Worker {
     }
 
     /// What interactions need, and their time.
-    pub(super) fn begin_interaction(&self) -> (Timer<'_>, MutexGuard<'_, Scratch>) {
-        (self.clock.time(Stage::Interaction), lock(&self.scratch))
+    pub(super) fn begin_interaction(&self, frame: u64) -> (Timer<'_>, MutexGuard<'_, Scratch>) {
+        (self.clock.time(Stage::Interaction, frame), lock(&self.scratch))
     }
 
     /// What updates need, and their time.
-    pub(super) fn begin_update(&self) -> (Timer<'_>, MutexGuard<'_, Outbox>) {
-        (self.clock.time(Stage::Update), lock(&self.outbox))
+    pub(super) fn begin_update(&self, frame: u64) -> (Timer<'_>, MutexGuard<'_, Outbox>) {
+        (self.clock.time(Stage::Update, frame), lock(&self.outbox))
     }
 
     /// Moves what was sent to the next frame's mail.
@@ -74,12 +74,12 @@ pub(super) fn check_threads(threads: usize) -> Result<(), ExecutorError> {
 impl Engine {
     pub(super) fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
         check_threads(threads)?;
+        let frame = scene.frame;
         let world = World::new(scene, grain, threads)?;
         let blocks = world.blocks.len();
         Ok(Self {
-            mail: Mail::new(),
             workers: (0..threads).map(|_| Worker::new(blocks)).collect(),
-            frame: 0,
+            frame,
             bounds: Vec::with_capacity(blocks),
             found: (0..blocks).map(|_| world::found_list()).collect(),
             candidates: Candidates::new(blocks),
@@ -97,7 +97,7 @@ impl Engine {
         if self.world.regroups_before(self.frame) {
             self.world.regroup();
         }
-        self.mail.turn();
+        self.world.mail.turn();
         self.broad_phase(loops);
         let pairs = self.interact(loops);
         self.update(loops, updated);
@@ -109,8 +109,8 @@ impl Engine {
         let World { stages, blocks, partners, .. } = &self.world;
         self.bounds.clear();
         self.bounds.extend(blocks.iter().map(Block::bounds));
-        let (bounds, workers) = (&self.bounds, &self.workers);
-        let begin = |worker: usize| workers[worker].clock.time(Stage::BroadPhase);
+        let (bounds, workers, frame) = (&self.bounds, &self.workers, self.frame);
+        let begin = |worker: usize| workers[worker].clock.time(Stage::BroadPhase, frame);
         loops.for_each(&mut self.found, begin, |_timer, first, found| {
             let may_touch = |second: usize| {
                 let (first, second) = world::pair(blocks, [first as u32, second as u32]);
@@ -130,9 +130,9 @@ impl Engine {
         if self.outcomes.len() < pairs.len() {
             self.outcomes.resize_with(pairs.len(), Outcome::new);
         }
-        let workers = &self.workers;
+        let (workers, frame) = (&self.workers, self.frame);
         let outcomes = &mut self.outcomes[..pairs.len()];
-        let begin = |worker: usize| workers[worker].begin_interaction();
+        let begin = |worker: usize| workers[worker].begin_interaction(frame);
         loops.for_each(outcomes, begin, |(_timer, scratch), place, outcome| {
             let (first, second) = world::pair(blocks, pairs[place]);
             outcome.compute(stages, first, second, scratch);
@@ -144,18 +144,29 @@ impl Engine {
     }
 
     fn update(&mut self, loops: &impl ParallelFor, updated: impl Fn(usize, &Block) + Sync + Send) {
-        let World { stages, blocks, .. } = &mut self.world;
+        let World { stages, blocks, mail, outside, .. } = &mut self.world;
         let (candidates, outcomes, workers) = (&self.candidates, &self.outcomes, &self.workers);
-        let (frame, mail) = (self.frame, &self.mail);
-        let begin = |worker: usize| workers[worker].begin_update();
+        let (frame, from_outside) = (self.frame, outside.due(self.frame));
+        let letters = |object| mail.to(object).chain(from_outside.to(object));
+        let begin = |worker: usize| workers[worker].begin_update(frame);
         loops.for_each(blocks, begin, |(_timer, outbox), index, block| {
             let outcomes = candidates.of_block(index).map(|place| &outcomes[place]);
             outcomes.flat_map(Outcome::segments).for_each(|segment| block.receive(segment));
             let mut post = |from, to, message| outbox.push((from, to, message));
-            stages.update(frame, block, mail.letters(), &mut post);
+            stages.update(frame, block, letters, &mut post);
             updated(index, block);
         });
-        Worker::collect(&self.workers, &mut self.mail);
+        Worker::collect(&self.workers, mail);
+    }
+
+    pub(super) fn into_scene(self) -> Scene {
+        self.world.into_scene(self.frame)
+    }
+
+    pub(super) fn watch(&self, timeline: &Arc<Timeline>) {
+        for (index, worker) in self.workers.iter().enumerate() {
+            worker.clock.watch(Arc::clone(timeline), index);
+        }
     }
 
     pub(super) fn stage_seconds(&self, running: Duration) -> Vec<StageSeconds> {

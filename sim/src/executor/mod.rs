@@ -1,6 +1,6 @@
 //! Executors: what drives the four stages, frame by frame.
 //!
-//! Every executor calls the same [`Stages`](crate::stages::Stages) on the same
+//! Every executor calls the same [`Stages`] on the same
 //! [`Block`](crate::block::Block)s and comes to the same bits.
 
 mod barrier;
@@ -9,6 +9,7 @@ mod engine;
 mod mail;
 #[cfg(feature = "native-peers")]
 mod native;
+mod outside;
 mod parallel_for;
 mod pipeline;
 mod rayon;
@@ -17,19 +18,21 @@ mod serial;
 mod static_;
 mod world;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use thiserror::Error;
 
 use crate::blocking::BlockingError;
-use crate::message::Message;
-use crate::object::{Object, ObjectId};
+use crate::mailbox::Mailbox;
+use crate::object::Object;
 use crate::render::Renderer;
-use crate::stages::PairCount;
+use crate::scene::Scene;
+use crate::stages::{PairCount, Stages};
+use crate::timeline::Timeline;
 
 pub use self::rayon::{RayonExecutor, RayonLoops};
 pub use clock::{Stage, StageSeconds};
-pub use mail::{Letter, Mail};
 #[cfg(feature = "native-peers")]
 pub use native::{
     OpenMpDynamicExecutor, OpenMpStaticExecutor, TbbForExecutor, TbbPipelineExecutor,
@@ -163,15 +166,28 @@ pub trait Executor {
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<(), ExecutorError>;
 
-    /// The number of frames done so far, which is the number of the next one.
+    /// The number of the next frame: the scene's, and one more for each frame done since.
     fn frame(&self) -> u64;
 
     /// Shows every object in its present state, in no particular order.
     fn visit(&self, visit: &mut dyn FnMut(&Object));
 
-    /// Posts a message from outside, which is processed in the next frame after all messages that
-    /// objects sent.
-    fn post(&mut self, to: ObjectId, message: Message);
+    /// Where messages from outside are posted.
+    fn mailbox(&self) -> &Mailbox;
+
+    /// Lets the rules, or the numbers that all stages share, be changed between two runs.
+    fn change(&mut self, change: &mut dyn FnMut(&mut Stages));
+
+    /// Takes the environment out as it is after the last frame done, with all messages that are under
+    /// way: to go on by another executor, say, or with another object. After an error its state depends
+    /// on the schedule.
+    fn into_scene(self: Box<Self>) -> Scene;
+
+    /// Records on `timeline`, from the next frame on, what each worker does. Workers have the numbers
+    /// that they have in [`Executor::stage_seconds`]; only the calling thread of
+    /// [`RayonOverlappedExecutor`], which renders beside the workers, comes after them as one more. An
+    /// executor has one timeline for life, the first that it is given.
+    fn watch(&mut self, timeline: Arc<Timeline>);
 
     /// What each worker spent its time on since the executor was built.
     fn stage_seconds(&self) -> Vec<StageSeconds>;

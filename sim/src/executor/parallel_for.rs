@@ -1,15 +1,18 @@
 //! Stage after stage, each a parallel loop.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::clock::{Stage, StageSeconds};
 use super::engine::Engine;
 use super::{Executor, ExecutorError, FrameRecord, world};
 use crate::blocking::Grain;
-use crate::message::Message;
-use crate::object::{Object, ObjectId};
+use crate::mailbox::Mailbox;
+use crate::object::Object;
 use crate::render::Renderer;
 use crate::scene::Scene;
+use crate::stages::Stages;
+use crate::timeline::Timeline;
 
 /// Parallel loops on a fixed number of threads.
 pub trait ParallelFor: Sized + Sync {
@@ -64,18 +67,20 @@ impl<P: ParallelFor> Executor for LoopExecutor<P> {
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<(), ExecutorError> {
         let began = Instant::now();
+        self.engine.world.outside.begin(self.engine.frame);
         for _ in 0..frames {
             let (engine, loops) = (&mut self.engine, &self.loops);
             let frame = engine.frame;
             let pairs = loops.enter(|| engine.compute(loops, |_, _| ()));
             {
-                let _timer = self.engine.workers[0].clock.time(Stage::Render);
+                let _timer = self.engine.workers[0].clock.time(Stage::Render, frame);
                 for block in &self.engine.world.blocks {
                     self.engine.world.stages.render(block, renderer);
                 }
                 renderer.swap(frame);
             }
             on_frame(&FrameRecord { frame, swapped: Instant::now(), pairs });
+            self.engine.world.outside.swapped(frame);
         }
         self.running += began.elapsed();
         Ok(())
@@ -89,8 +94,20 @@ impl<P: ParallelFor> Executor for LoopExecutor<P> {
         world::visit(&self.engine.world.blocks, visit);
     }
 
-    fn post(&mut self, to: ObjectId, message: Message) {
-        self.engine.mail.collect(ObjectId::HOST, to, message);
+    fn mailbox(&self) -> &Mailbox {
+        self.engine.world.outside.mailbox()
+    }
+
+    fn change(&mut self, change: &mut dyn FnMut(&mut Stages)) {
+        self.engine.world.change(change);
+    }
+
+    fn into_scene(self: Box<Self>) -> Scene {
+        self.engine.into_scene()
+    }
+
+    fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.engine.watch(&timeline);
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {

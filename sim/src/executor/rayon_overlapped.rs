@@ -1,7 +1,7 @@
 //! Rayon, with each frame rendered from a copy beside the next frame.
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::clock::{Stage, StageSeconds};
@@ -11,11 +11,12 @@ use super::rayon::RayonLoops;
 use super::{Executor, ExecutorError, FrameRecord, world};
 use crate::block::Block;
 use crate::blocking::Grain;
-use crate::message::Message;
-use crate::object::{Object, ObjectId};
+use crate::mailbox::Mailbox;
+use crate::object::Object;
 use crate::render::Renderer;
 use crate::scene::Scene;
-use crate::stages::{PairCount, draw};
+use crate::stages::{PairCount, Stages, draw};
+use crate::timeline::Timeline;
 
 /// As [`RayonExecutor`], but every update also copies what a renderer sees, and the calling thread
 /// renders that copy while the pool computes the next frame: the best overlap of rendering that can
@@ -26,6 +27,7 @@ pub struct RayonOverlappedExecutor {
     engine: Engine,
     loops: RayonLoops,
     pictures: Vec<Picture>,
+    timeline: Option<Arc<Timeline>>,
     running: Duration,
 }
 
@@ -44,7 +46,8 @@ impl RayonOverlappedExecutor {
         let engine = Engine::new(scene, grain, threads)?;
         let mut pictures = Vec::with_capacity(PICTURES);
         pictures.resize_with(PICTURES, || picture(&engine.world.blocks));
-        Ok(Self { engine, loops: RayonLoops::new(threads)?, pictures, running: Duration::ZERO })
+        let (loops, running) = (RayonLoops::new(threads)?, Duration::ZERO);
+        Ok(Self { engine, loops, pictures, timeline: None, running })
     }
 }
 
@@ -63,6 +66,9 @@ impl Executor for RayonOverlappedExecutor {
         for picture in self.pictures.drain(..) {
             give_back(&used, picture);
         }
+        let outside = Arc::clone(&self.engine.world.outside);
+        outside.begin(self.engine.frame);
+        let beside_workers = self.engine.workers.len();
         let (engine, loops) = (&mut self.engine, &self.loops);
         let mut render_time = Duration::ZERO;
         let unused = std::thread::scope(|scope| {
@@ -74,8 +80,14 @@ impl Executor for RayonOverlappedExecutor {
                 let began = Instant::now();
                 show(&picture, renderer);
                 renderer.swap(frame);
-                render_time += began.elapsed();
+                let ended = Instant::now();
+                render_time += ended - began;
+                if let Some(timeline) = &self.timeline {
+                    timeline.record(beside_workers, Stage::Render, frame, began, ended);
+                }
                 on_frame(&FrameRecord { frame, swapped: Instant::now(), pairs });
+                // Before its picture is given back, without which the frame after next is not computed.
+                outside.swapped(frame);
                 give_back(&used, picture);
             }
             drop(used);
@@ -98,8 +110,21 @@ impl Executor for RayonOverlappedExecutor {
         world::visit(&self.engine.world.blocks, visit);
     }
 
-    fn post(&mut self, to: ObjectId, message: Message) {
-        self.engine.mail.collect(ObjectId::HOST, to, message);
+    fn mailbox(&self) -> &Mailbox {
+        self.engine.world.outside.mailbox()
+    }
+
+    fn change(&mut self, change: &mut dyn FnMut(&mut Stages)) {
+        self.engine.world.change(change);
+    }
+
+    fn into_scene(self: Box<Self>) -> Scene {
+        self.engine.into_scene()
+    }
+
+    fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.engine.watch(&timeline);
+        self.timeline.get_or_insert(timeline);
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {

@@ -1,20 +1,21 @@
 //! One thread, stage after stage.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::clock::{Clock, Stage, StageSeconds};
-use super::mail::Mail;
 use super::world::{self, Candidates, Outbox, Outcome, World};
 use super::{Executor, ExecutorError, FrameRecord};
 use crate::block::Block;
 use crate::blocking::Grain;
 use crate::geometry::Bounds;
 use crate::interaction::Scratch;
-use crate::message::Message;
-use crate::object::{Object, ObjectId};
+use crate::mailbox::Mailbox;
+use crate::object::Object;
 use crate::render::Renderer;
 use crate::scene::Scene;
-use crate::stages::PairCount;
+use crate::stages::{PairCount, Stages};
+use crate::timeline::Timeline;
 
 /// One thread, stage after stage: no locks, no queues, nothing of the pipeline.
 pub struct SerialExecutor {
@@ -24,7 +25,6 @@ pub struct SerialExecutor {
     candidates: Candidates,
     outcomes: Vec<Outcome>,
     outbox: Outbox,
-    mail: Mail,
     scratch: Scratch,
     clock: Clock,
     running: Duration,
@@ -37,6 +37,7 @@ impl SerialExecutor {
     /// # Errors
     /// Objects that cannot be grouped.
     pub fn new(scene: Scene, grain: Grain) -> Result<Self, ExecutorError> {
+        let frame = scene.frame;
         let world = World::new(scene, grain, 1)?;
         let blocks = world.blocks.len();
         Ok(Self {
@@ -45,17 +46,16 @@ impl SerialExecutor {
             candidates: Candidates::new(blocks),
             outcomes: (0..world::first_outcomes(blocks)).map(|_| Outcome::new()).collect(),
             outbox: world::outbox(blocks),
-            mail: Mail::new(),
             scratch: Scratch::new(),
             clock: Clock::default(),
             running: Duration::ZERO,
-            frame: 0,
+            frame,
             world,
         })
     }
 
     fn broad_phase(&mut self) {
-        let _timer = self.clock.time(Stage::BroadPhase);
+        let _timer = self.clock.time(Stage::BroadPhase, self.frame);
         let World { stages, blocks, partners, .. } = &self.world;
         self.bounds.clear();
         self.bounds.extend(blocks.iter().map(Block::bounds));
@@ -71,7 +71,7 @@ impl SerialExecutor {
     }
 
     fn interact(&mut self) -> PairCount {
-        let _timer = self.clock.time(Stage::Interaction);
+        let _timer = self.clock.time(Stage::Interaction, self.frame);
         let pairs = &self.candidates.pairs;
         if self.outcomes.len() < pairs.len() {
             self.outcomes.resize_with(pairs.len(), Outcome::new);
@@ -86,19 +86,21 @@ impl SerialExecutor {
     }
 
     fn update(&mut self) {
-        let _timer = self.clock.time(Stage::Update);
-        let World { stages, blocks, .. } = &mut self.world;
+        let _timer = self.clock.time(Stage::Update, self.frame);
+        let World { stages, blocks, mail, outside, .. } = &mut self.world;
+        let from_outside = outside.due(self.frame);
+        let letters = |object| mail.to(object).chain(from_outside.to(object));
         for (index, block) in blocks.iter_mut().enumerate() {
             let outcomes = self.candidates.of_block(index).map(|place| &self.outcomes[place]);
             outcomes.flat_map(Outcome::segments).for_each(|segment| block.receive(segment));
             let mut post = |from, to, message| self.outbox.push((from, to, message));
-            stages.update(self.frame, block, self.mail.letters(), &mut post);
+            stages.update(self.frame, block, letters, &mut post);
         }
-        world::empty_into(&mut self.outbox, &mut self.mail);
+        world::empty_into(&mut self.outbox, mail);
     }
 
     fn render(&mut self, renderer: &mut dyn Renderer) {
-        let _timer = self.clock.time(Stage::Render);
+        let _timer = self.clock.time(Stage::Render, self.frame);
         for block in &self.world.blocks {
             self.world.stages.render(block, renderer);
         }
@@ -114,16 +116,18 @@ impl Executor for SerialExecutor {
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<(), ExecutorError> {
         let began = Instant::now();
+        self.world.outside.begin(self.frame);
         for _ in 0..frames {
             if self.world.regroups_before(self.frame) {
                 self.world.regroup();
             }
-            self.mail.turn();
+            self.world.mail.turn();
             self.broad_phase();
             let pairs = self.interact();
             self.update();
             self.render(renderer);
             on_frame(&FrameRecord { frame: self.frame, swapped: Instant::now(), pairs });
+            self.world.outside.swapped(self.frame);
             self.frame += 1;
         }
         self.running += began.elapsed();
@@ -138,8 +142,20 @@ impl Executor for SerialExecutor {
         world::visit(&self.world.blocks, visit);
     }
 
-    fn post(&mut self, to: ObjectId, message: Message) {
-        self.mail.collect(ObjectId::HOST, to, message);
+    fn mailbox(&self) -> &Mailbox {
+        self.world.outside.mailbox()
+    }
+
+    fn change(&mut self, change: &mut dyn FnMut(&mut Stages)) {
+        self.world.change(change);
+    }
+
+    fn into_scene(self: Box<Self>) -> Scene {
+        self.world.into_scene(self.frame)
+    }
+
+    fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.clock.watch(timeline, 0);
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {

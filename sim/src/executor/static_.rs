@@ -7,26 +7,28 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::barrier::Barrier;
-use super::clock::{Clock, Stage, StageSeconds};
+use super::clock::{Clock, Stage, StageSeconds, Timer};
 use super::engine::check_threads;
 use super::mail::Mail;
+use super::outside::Outside;
 use super::world::{self, Candidates, Outbox, Outcome, Partners, World};
 use super::{Executor, ExecutorError, FrameRecord};
 use crate::block::Block;
 use crate::blocking::{Blocking, Grain};
 use crate::geometry::Bounds;
 use crate::interaction::Scratch;
-use crate::message::Message;
-use crate::object::{Object, ObjectId};
+use crate::mailbox::Mailbox;
+use crate::object::Object;
 use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::stages::{PairCount, Stages};
+use crate::timeline::Timeline;
 
 /// Long-lived threads, each with its equal share of blocks and of candidates, and a barrier after each
 /// stage. The calling thread is one of them, and renders while the others wait.
 pub struct StaticExecutor {
+    team: Team,
     shared: Arc<Shared>,
-    threads: Vec<JoinHandle<()>>,
     blocking: Blocking,
     scratch: Scratch,
     grain: Grain,
@@ -36,8 +38,6 @@ pub struct StaticExecutor {
 
 /// What the threads share. The barriers keep them apart, so no lock is ever contended for writing.
 struct Shared {
-    stages: Stages,
-    partners: Partners,
     blocks: Vec<RwLock<Block>>,
     found: Vec<Mutex<Vec<u32>>>,
     outboxes: Vec<Mutex<Outbox>>,
@@ -46,10 +46,19 @@ struct Shared {
     clocks: Vec<Clock>,
     frame: AtomicU64,
     stop: AtomicBool,
+    outside: Arc<Outside>,
+}
+
+/// All threads but the calling one.
+struct Team {
+    shared: Arc<Shared>,
+    threads: Vec<JoinHandle<()>>,
 }
 
 /// What the calling thread prepares for all.
 struct Plan {
+    stages: Stages,
+    partners: Partners,
     bounds: Vec<Bounds>,
     candidates: Candidates,
     outcomes: Vec<RwLock<Outcome>>,
@@ -63,18 +72,19 @@ impl StaticExecutor {
     /// No or too many threads, objects that cannot be grouped, or a thread that cannot be started.
     pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
         check_threads(threads)?;
+        let frame = scene.frame;
         let world = World::new(scene, grain, threads)?;
         let count = world.blocks.len();
         let outcome = |_| RwLock::new(Outcome::new());
         let plan = Plan {
+            stages: world.stages,
+            partners: world.partners,
             bounds: Vec::with_capacity(count),
             candidates: Candidates::new(count),
             outcomes: (0..world::first_outcomes(count)).map(outcome).collect(),
-            mail: Mail::new(),
+            mail: world.mail,
         };
         let shared = Arc::new(Shared {
-            stages: world.stages,
-            partners: world.partners,
             blocks: world.blocks.into_iter().map(RwLock::new).collect(),
             found: (0..count).map(|_| Mutex::new(world::found_list())).collect(),
             outboxes: (0..count).map(|_| Mutex::new(world::outbox(1))).collect(),
@@ -83,10 +93,11 @@ impl StaticExecutor {
             clocks: (0..threads).map(|_| Clock::default()).collect(),
             frame: AtomicU64::new(0),
             stop: AtomicBool::new(false),
+            outside: world.outside,
         });
-        let threads = start(&shared, threads)?;
+        let team = Team { threads: start(&shared, threads)?, shared: Arc::clone(&shared) };
         let (blocking, running) = (world.blocking, Duration::ZERO);
-        Ok(Self { shared, threads, blocking, scratch: Scratch::new(), grain, running, frame: 0 })
+        Ok(Self { team, shared, blocking, scratch: Scratch::new(), grain, running, frame })
     }
 
     /// Forms the blocks anew.
@@ -113,9 +124,10 @@ impl StaticExecutor {
     }
 
     fn render(&self, renderer: &mut dyn Renderer) {
-        let _timer = self.shared.clocks[0].time(Stage::Render);
+        let _timer = self.shared.clocks[0].time(Stage::Render, self.frame);
+        let plan = read(&self.shared.plan);
         for block in &self.shared.blocks {
-            self.shared.stages.render(&read(block), renderer);
+            plan.stages.render(&read(block), renderer);
         }
         renderer.swap(self.frame);
     }
@@ -168,15 +180,15 @@ impl Shared {
     }
 
     fn broad_phase(&self, worker: usize) {
-        let _timer = self.clocks[worker].time(Stage::BroadPhase);
+        let _timer = self.time(worker, Stage::BroadPhase);
         let plan = read(&self.plan);
         for first in self.share(worker, self.blocks.len()) {
             let own = read(&self.blocks[first]);
             let may_touch = |other: usize| {
                 let second = (other != first).then(|| read(&self.blocks[other]));
-                world::may_touch(&self.stages, &own, second.as_deref())
+                world::may_touch(&plan.stages, &own, second.as_deref())
             };
-            self.partners.find(first, &plan.bounds, may_touch, &mut lock(&self.found[first]));
+            plan.partners.find(first, &plan.bounds, may_touch, &mut lock(&self.found[first]));
         }
     }
 
@@ -194,21 +206,23 @@ impl Shared {
     }
 
     fn interact(&self, worker: usize, scratch: &mut Scratch) {
-        let _timer = self.clocks[worker].time(Stage::Interaction);
+        let _timer = self.time(worker, Stage::Interaction);
         let plan = read(&self.plan);
         for place in self.share(worker, plan.candidates.pairs.len()) {
             let [first, second] = plan.candidates.pairs[place];
             let other = (first != second).then(|| read(&self.blocks[second as usize]));
             let first = read(&self.blocks[first as usize]);
             let mut outcome = write(&plan.outcomes[place]);
-            outcome.compute(&self.stages, &first, other.as_deref(), scratch);
+            outcome.compute(&plan.stages, &first, other.as_deref(), scratch);
         }
     }
 
     fn update(&self, worker: usize) {
-        let _timer = self.clocks[worker].time(Stage::Update);
+        let _timer = self.time(worker, Stage::Update);
         let frame = self.frame.load(Ordering::Relaxed);
         let plan = read(&self.plan);
+        let from_outside = self.outside.due(frame);
+        let letters = |object| plan.mail.to(object).chain(from_outside.to(object));
         for index in self.share(worker, self.blocks.len()) {
             let mut outbox = lock(&self.outboxes[index]);
             let mut post = |from, to, message| outbox.push((from, to, message));
@@ -216,8 +230,13 @@ impl Shared {
             for place in plan.candidates.of_block(index) {
                 read(&plan.outcomes[place]).segments().for_each(|segment| block.receive(segment));
             }
-            self.stages.update(frame, &mut block, plan.mail.letters(), &mut post);
+            plan.stages.update(frame, &mut block, letters, &mut post);
         }
+    }
+
+    fn time(&self, worker: usize, stage: Stage) -> Timer<'_> {
+        // Relaxed: the barrier lies between.
+        self.clocks[worker].time(stage, self.frame.load(Ordering::Relaxed))
     }
 
     /// A worker's part of so many items.
@@ -248,6 +267,7 @@ impl Executor for StaticExecutor {
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<(), ExecutorError> {
         let began = Instant::now();
+        self.shared.outside.begin(self.frame);
         for _ in 0..frames {
             self.prepare();
             self.shared.barrier.wait();
@@ -255,6 +275,7 @@ impl Executor for StaticExecutor {
             let pairs = self.shared.finish();
             self.render(renderer);
             on_frame(&FrameRecord { frame: self.frame, swapped: Instant::now(), pairs });
+            self.shared.outside.swapped(self.frame);
             self.frame += 1;
         }
         self.running += began.elapsed();
@@ -271,8 +292,36 @@ impl Executor for StaticExecutor {
         }
     }
 
-    fn post(&mut self, to: ObjectId, message: Message) {
-        write(&self.shared.plan).mail.collect(ObjectId::HOST, to, message);
+    fn mailbox(&self) -> &Mailbox {
+        self.shared.outside.mailbox()
+    }
+
+    fn change(&mut self, change: &mut dyn FnMut(&mut Stages)) {
+        let mut plan = write(&self.shared.plan);
+        if world::changes_pairs(&mut plan.stages, change) {
+            let blocks = &self.shared.blocks;
+            let block = |index: usize| read(&blocks[index]);
+            plan.partners = Partners::new(&plan.stages, self.grain, blocks.len(), block);
+        }
+    }
+
+    fn into_scene(self: Box<Self>) -> Scene {
+        let Self { team, shared, frame, .. } = *self;
+        drop(team);
+        let Some(Shared { blocks, plan, outside, .. }) = Arc::into_inner(shared) else {
+            unreachable!("the other threads have ended")
+        };
+        let Plan { stages, mail, .. } = plan.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let blocks = blocks.into_iter().map(RwLock::into_inner);
+        let blocks = blocks.map(|block| block.unwrap_or_else(PoisonError::into_inner));
+        let objects = blocks.flat_map(|block| block.objects);
+        world::scene(objects, stages, frame, mail.into_letters(frame), &outside)
+    }
+
+    fn watch(&mut self, timeline: Arc<Timeline>) {
+        for (index, clock) in self.shared.clocks.iter().enumerate() {
+            clock.watch(Arc::clone(&timeline), index);
+        }
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {
@@ -280,7 +329,7 @@ impl Executor for StaticExecutor {
     }
 }
 
-impl Drop for StaticExecutor {
+impl Drop for Team {
     fn drop(&mut self) {
         self.shared.stop.store(true, Ordering::Relaxed);
         if std::thread::panicking() {

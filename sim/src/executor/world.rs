@@ -1,13 +1,17 @@
 //! What the stage-by-stage executors have in common: plain data and the work of one item of each
 //! stage.
 
+use std::ops::Deref;
+use std::sync::Arc;
+
 use super::ExecutorError;
 use super::mail::Mail;
+use super::outside::Outside;
 use crate::block::Block;
 use crate::blocking::{Blocking, FRAMES_PER_BLOCKING, Grain};
 use crate::geometry::Bounds;
 use crate::interaction::{Contact, ContactBuffer, Scratch};
-use crate::message::Message;
+use crate::message::{Letter, Message};
 use crate::object::{Object, ObjectId};
 use crate::scene::Scene;
 use crate::stages::{PairCount, Stages};
@@ -26,15 +30,34 @@ pub(super) struct World {
     pub(super) blocks: Vec<Block>,
     pub(super) blocking: Blocking,
     pub(super) partners: Partners,
+    pub(super) mail: Mail,
+    pub(super) outside: Arc<Outside>,
     grain: Grain,
 }
 
 impl World {
     pub(super) fn new(scene: Scene, grain: Grain, workers: usize) -> Result<Self, ExecutorError> {
-        let Scene { objects, stages } = scene;
+        let Scene { objects, stages, frame, mail: under_way, mailbox } = scene;
         let (blocking, blocks) = Blocking::new(objects, grain, workers)?;
-        let partners = Partners::new(&stages, &blocks, grain);
-        Ok(Self { stages, blocks, blocking, partners, grain })
+        let partners = Partners::new(&stages, grain, blocks.len(), |index| &blocks[index]);
+        let mut mail = Mail::default();
+        let collect = |from, to, message| mail.collect(from, to, message);
+        let outside = Arc::new(Outside::new(mailbox, under_way, frame, collect));
+        Ok(Self { stages, blocks, blocking, partners, mail, outside, grain })
+    }
+
+    /// The environment before the frame `frame`.
+    pub(super) fn into_scene(self, frame: u64) -> Scene {
+        let objects = self.blocks.into_iter().flat_map(|block| block.objects);
+        scene(objects, self.stages, frame, self.mail.into_letters(frame), &self.outside)
+    }
+
+    /// Changes what all stages share.
+    pub(super) fn change(&mut self, change: &mut dyn FnMut(&mut Stages)) {
+        if changes_pairs(&mut self.stages, change) {
+            let Self { stages, blocks, grain, .. } = &*self;
+            self.partners = Partners::new(stages, *grain, blocks.len(), |index| &blocks[index]);
+        }
     }
 
     /// Whether blocks are formed anew before a frame.
@@ -54,6 +77,29 @@ impl World {
     }
 }
 
+/// Changes what all stages share, and says whether other groups have rules with each other then.
+pub(super) fn changes_pairs(stages: &mut Stages, change: &mut dyn FnMut(&mut Stages)) -> bool {
+    let before = stages.rules.partners();
+    change(stages);
+    stages.rules.partners() != before
+}
+
+/// The environment before the frame `frame`; `mail` is between its objects.
+pub(super) fn scene(
+    objects: impl Iterator<Item = Object>,
+    stages: Stages,
+    frame: u64,
+    mail: impl Iterator<Item = Letter>,
+    outside: &Outside,
+) -> Scene {
+    let mut objects: Vec<Object> = objects.collect();
+    objects.sort_unstable_by_key(Object::id);
+    // What was sent to nobody is not for an object that is added.
+    let mail = mail.filter(|letter| (letter.to.0 as usize) < objects.len());
+    let mail = mail.chain(outside.take_letters(frame)).collect();
+    Scene { objects, stages, frame, mail, mailbox: outside.mailbox().clone() }
+}
+
 /// Whether blocks of this grain are formed anew before a frame.
 pub(super) fn regroups_before(grain: Grain, frame: u64) -> bool {
     grain == Grain::Spatial && frame > 0 && frame.is_multiple_of(FRAMES_PER_BLOCKING)
@@ -64,17 +110,22 @@ pub(super) struct Partners(Vec<Vec<u32>>);
 
 impl Partners {
     /// All for blocks whose objects change; for single objects those there is a rule for.
-    fn new(stages: &Stages, blocks: &[Block], grain: Grain) -> Self {
+    pub(super) fn new<B: Deref<Target = Block>>(
+        stages: &Stages,
+        grain: Grain,
+        blocks: usize,
+        block: impl Fn(usize) -> B,
+    ) -> Self {
         let modelled = |a: &Block, b: &Block| match (grain, a.objects(), b.objects()) {
             (Grain::Pairwise, [a], [b]) => a.id() != b.id() && stages.rules.interact(a, b),
             _ => true,
         };
         let of = |first: usize| {
-            let others =
-                (first..blocks.len()).filter(|&other| modelled(&blocks[first], &blocks[other]));
+            let own = block(first);
+            let others = (first..blocks).filter(|&other| modelled(&own, &block(other)));
             others.map(|other| other as u32).collect()
         };
-        Self((0..blocks.len()).map(of).collect())
+        Self((0..blocks).map(of).collect())
     }
 
     /// Finds the partners of block `first` that may interact with it. `may_touch` looks at the blocks

@@ -127,6 +127,17 @@ impl Mesh {
         }
     }
 
+    /// Multiplies the velocities of all nodes that are not held fast.
+    pub(crate) fn damp(&mut self, factor: f32) {
+        for component in &mut self.velocities.components {
+            for (velocities, masses) in component.iter_mut().zip(&self.masses) {
+                for (velocity, &mass) in velocities.iter_mut().zip(masses) {
+                    *velocity *= if mass > 0.0 { factor } else { 1.0 };
+                }
+            }
+        }
+    }
+
     /// The mean of the nodes' positions, in metres.
     #[must_use]
     pub fn center(&self) -> Vec3 {

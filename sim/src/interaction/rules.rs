@@ -89,6 +89,11 @@ impl Rules {
             .any(|(group, partners)| a >> group & 1 == 1 && partners & b != 0)
     }
 
+    /// For each group a bit for every group that it has a rule with.
+    pub(crate) fn partners(&self) -> [u32; Group::COUNT] {
+        self.partners
+    }
+
     /// The rule for two objects, and the objects in the rule's order.
     pub(crate) fn find<'o>(
         &self,

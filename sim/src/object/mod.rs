@@ -189,7 +189,11 @@ impl Object {
             }
             Message::Remove => self.quarantine(Fault { kind: FaultKind::Removed, frame }),
             Message::Custom(custom) => custom.process(self),
-            Message::Stiffness { .. } | Message::Weightless(_) => self.behavior.process(message),
+            Message::Stiffness { .. }
+            | Message::Damping(_)
+            | Message::Pull { .. }
+            | Message::Release
+            | Message::Weightless(_) => self.behavior.process(message),
         }
     }
 

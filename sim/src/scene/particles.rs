@@ -10,7 +10,8 @@ use super::random::SplitMix64;
 use crate::behavior::{Fixed, MassSpring, MassSpringError};
 use crate::blocking::Blocking;
 use crate::geometry::{
-    Geometry, ICOSPHERE_NODES, Mesh, MeshError, Rigid, Topology, TopologyError, edges, icosphere,
+    Bounds, Geometry, ICOSPHERE_NODES, Mesh, MeshError, Rigid, Topology, TopologyError, edges,
+    icosphere,
 };
 use crate::interaction::{
     InteractionPair, NodeSpheres, NodesInShape, Penalty, PenaltyError, RuleError, Rules,
@@ -49,8 +50,6 @@ const WALL_STIFFNESS: f32 = 200.0;
 const WALL_DAMPING: f32 = 0.2;
 /// The coefficient of friction on a wall; usually 0.3.
 const WALL_FRICTION: f32 = 0.3;
-/// The time from one frame to the next, in seconds; usually 1/240.
-const TIME_STEP: f32 = 1.0 / 240.0;
 /// The acceleration of gravity, in metres per second squared; usually 9.81 downwards (−y).
 const GRAVITY: f32 = 9.81;
 /// The room's volume for each particle, in cubic metres; usually 0.046: a particle with its contact
@@ -115,10 +114,20 @@ impl ParticleScene {
     /// The most particles: what blocks can hold, less the walls.
     pub const MAX_OBJECTS: usize = Blocking::MAX_OBJECTS - 6;
 
+    /// The time from one frame to the next, in seconds; usually 1/240.
+    pub const TIME_STEP: f32 = 1.0 / 240.0;
+
     /// So many particles without gravity, damped, from seed 1.
     #[must_use]
     pub fn new(objects: usize) -> Self {
         Self { objects, seed: 1, gravity: false, damping: true, most_substeps: 10 }
+    }
+
+    /// The room, from wall to wall.
+    #[must_use]
+    pub fn room(&self) -> Bounds {
+        let half = Vec3::splat(half_side(&lattice(self.objects)));
+        Bounds { min: -half, max: half }
     }
 
     /// Builds the objects and the rules.
@@ -145,12 +154,12 @@ impl ParticleScene {
         let gravity = if self.gravity { Vec3::new(0.0, -GRAVITY, 0.0) } else { Vec3::ZERO };
         let stages = Stages {
             rules: self.rules()?,
-            time_step: TIME_STEP,
+            time_step: Self::TIME_STEP,
             gravity,
             callback_budget: None,
             simd: Simd::detect(),
         };
-        Ok(Scene { objects, stages })
+        Ok(Scene::new(objects, stages))
     }
 
     fn particles(&self, centers: &[Vec3]) -> Result<Vec<Object>, SceneError> {

@@ -125,7 +125,7 @@ impl Reference {
         let segments: Vec<_> = buffer.segments().collect();
         for block in &mut self.blocks {
             segments.iter().rev().for_each(|segment| block.receive(segment));
-            self.stages.update(self.frame, block, std::iter::empty(), &mut |_, _, _| {});
+            self.stages.update(self.frame, block, |_| std::iter::empty(), &mut |_, _, _| {});
         }
         self.frame += 1;
         count

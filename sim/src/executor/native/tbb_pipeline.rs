@@ -1,12 +1,12 @@
 //! oneTBB's `parallel_pipeline`.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use send_wrapper::SendWrapper;
 
 use super::super::clock::{Stage, StageSeconds};
 use super::super::engine::{Worker, check_threads};
-use super::super::mail::Mail;
 use super::super::parallel_for::ParallelFor;
 use super::super::world::{self, Candidates, Outcome, World};
 use super::super::{Executor, ExecutorError, FrameRecord};
@@ -14,11 +14,12 @@ use super::shim::Tbb;
 use crate::block::Block;
 use crate::blocking::Grain;
 use crate::geometry::Bounds;
-use crate::message::Message;
-use crate::object::{Object, ObjectId};
+use crate::mailbox::Mailbox;
+use crate::object::Object;
 use crate::render::Renderer;
 use crate::scene::Scene;
-use crate::stages::PairCount;
+use crate::stages::{PairCount, Stages};
+use crate::timeline::Timeline;
 
 /// Two oneTBB pipelines a frame: blocks are searched for partners and interact with them, in
 /// parallel, and what that gave is listed in order; then blocks are updated, in parallel, and rendered
@@ -34,7 +35,6 @@ use crate::stages::PairCount;
 pub struct TbbPipelineExecutor {
     world: World,
     arena: Tbb,
-    mail: Mail,
     workers: Vec<Worker>,
     bounds: Vec<Bounds>,
     searches: Vec<Search>,
@@ -58,18 +58,18 @@ impl TbbPipelineExecutor {
     /// No or too many threads, or objects that cannot be grouped.
     pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
         check_threads(threads)?;
+        let frame = scene.frame;
         let world = World::new(scene, grain, threads)?;
         let blocks = world.blocks.len();
         Ok(Self {
             arena: Tbb::new(threads)?,
-            mail: Mail::new(),
             workers: (0..threads).map(|_| Worker::new(blocks)).collect(),
             bounds: Vec::with_capacity(blocks),
             searches: (0..blocks).map(|_| Search::new()).collect(),
             candidates: Candidates::new(blocks),
             first_places: Vec::with_capacity(blocks),
             running: Duration::ZERO,
-            frame: 0,
+            frame,
             world,
         })
     }
@@ -78,20 +78,20 @@ impl TbbPipelineExecutor {
         if self.world.regroups_before(self.frame) {
             self.world.regroup();
         }
-        self.mail.turn();
+        self.world.mail.turn();
         self.bounds.clear();
         self.bounds.extend(self.world.blocks.iter().map(Block::bounds));
     }
 
     /// The first pipeline.
     fn interact(&mut self) -> PairCount {
-        let Self { world, workers, bounds, candidates, first_places, .. } = self;
+        let Self { world, workers, bounds, candidates, first_places, frame, .. } = self;
         let mut pairs = PairCount::default();
         candidates.clear();
         first_places.clear();
         self.arena.pipeline(
             &mut self.searches,
-            |worker, first, search| search.run(world, bounds, first, &workers[worker]),
+            |worker, first, search| search.run(world, bounds, first, &workers[worker], *frame),
             |_, first, search| {
                 first_places.push(candidates.pairs.len());
                 candidates.extend(first, &search.found);
@@ -103,29 +103,31 @@ impl TbbPipelineExecutor {
 
     /// The second pipeline.
     fn update(&mut self, renderer: &mut dyn Renderer) {
-        let Self { searches, workers, candidates, first_places, frame, mail, .. } = self;
-        let World { stages, blocks, .. } = &mut self.world;
+        let Self { searches, workers, candidates, first_places, frame, .. } = self;
+        let World { stages, blocks, mail, outside, .. } = &mut self.world;
+        let from_outside = outside.due(*frame);
+        let letters = |object| mail.to(object).chain(from_outside.to(object));
         let outcome = |place: usize| {
             let first = candidates.pairs[place][0] as usize;
             &searches[first].outcomes[place - first_places[first]]
         };
         let work = |worker: usize, index: usize, block: &mut Block| {
-            let (_timer, mut outbox) = workers[worker].begin_update();
+            let (_timer, mut outbox) = workers[worker].begin_update(*frame);
             let segments = candidates.of_block(index).map(outcome).flat_map(Outcome::segments);
             segments.for_each(|segment| block.receive(segment));
             let mut post = |from, to, message| outbox.push((from, to, message));
-            stages.update(*frame, block, mail.letters(), &mut post);
+            stages.update(*frame, block, letters, &mut post);
         };
         let mut waiting: Vec<&Block> = Vec::with_capacity(blocks.len());
         let mut screen = SendWrapper::new(renderer);
         self.arena.pipeline(blocks, work, |worker, _, block| {
             waiting.push(block);
             if screen.valid() {
-                let _timer = workers[worker].clock.time(Stage::Render);
+                let _timer = workers[worker].clock.time(Stage::Render, *frame);
                 waiting.drain(..).for_each(|block| stages.render(block, &mut **screen));
             }
         });
-        let _timer = workers[0].clock.time(Stage::Render);
+        let _timer = workers[0].clock.time(Stage::Render, *frame);
         waiting.drain(..).for_each(|block| stages.render(block, &mut **screen));
         screen.swap(*frame);
         Worker::collect(workers, mail);
@@ -139,10 +141,10 @@ impl Search {
     }
 
     /// Finds the partners of block `first`, and lets it interact with them.
-    fn run(&mut self, world: &World, bounds: &[Bounds], first: usize, worker: &Worker) {
+    fn run(&mut self, world: &World, bounds: &[Bounds], first: usize, worker: &Worker, frame: u64) {
         let World { stages, blocks, partners, .. } = world;
         let pair = |second: usize| world::pair(blocks, [first as u32, second as u32]);
-        let timer = worker.clock.time(Stage::BroadPhase);
+        let timer = worker.clock.time(Stage::BroadPhase, frame);
         let may_touch = |second| {
             let (first, second) = pair(second);
             world::may_touch(stages, first, second)
@@ -152,7 +154,7 @@ impl Search {
         if self.outcomes.len() < self.found.len() {
             self.outcomes.resize_with(self.found.len(), Outcome::new);
         }
-        let (_timer, mut scratch) = worker.begin_interaction();
+        let (_timer, mut scratch) = worker.begin_interaction(frame);
         for (&second, outcome) in self.found.iter().zip(&mut self.outcomes) {
             let (first, second) = pair(second as usize);
             outcome.compute(stages, first, second, &mut scratch);
@@ -172,11 +174,13 @@ impl Executor for TbbPipelineExecutor {
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<(), ExecutorError> {
         let began = Instant::now();
+        self.world.outside.begin(self.frame);
         for _ in 0..frames {
             self.prepare();
             let pairs = self.interact();
             self.update(renderer);
             on_frame(&FrameRecord { frame: self.frame, swapped: Instant::now(), pairs });
+            self.world.outside.swapped(self.frame);
             self.frame += 1;
         }
         self.running += began.elapsed();
@@ -191,8 +195,22 @@ impl Executor for TbbPipelineExecutor {
         world::visit(&self.world.blocks, visit);
     }
 
-    fn post(&mut self, to: ObjectId, message: Message) {
-        self.mail.collect(ObjectId::HOST, to, message);
+    fn mailbox(&self) -> &Mailbox {
+        self.world.outside.mailbox()
+    }
+
+    fn change(&mut self, change: &mut dyn FnMut(&mut Stages)) {
+        self.world.change(change);
+    }
+
+    fn into_scene(self: Box<Self>) -> Scene {
+        self.world.into_scene(self.frame)
+    }
+
+    fn watch(&mut self, timeline: Arc<Timeline>) {
+        for (index, worker) in self.workers.iter().enumerate() {
+            worker.clock.watch(Arc::clone(&timeline), index);
+        }
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {

@@ -8,6 +8,7 @@ use dualframe_core::stage::Stage;
 use dualframe_core::unit::Work;
 
 use crate::executor::StageSeconds;
+use crate::timeline::Timeline;
 
 /// Of so many frames one is timed; usually 7. Reading the system's clock takes some 50 ns, and with one
 /// object a unit every work unit is a change of stage: timing every frame would cost more than
@@ -20,15 +21,20 @@ const FRAMES_PER_SAMPLE: u32 = 7;
 enum Doing {
     Nothing,
     /// A work unit of a frame that is timed.
-    Timed(Stage),
+    Timed(Stage, Frame),
     /// A work unit of another frame.
     Untimed,
 }
 
 /// Counts the time from one change of stage to the next: acquiring work and doing it, as the paper
 /// measures (§7.2.2). Idle and busy time are measured, and how the busy time is shared out among the
-/// stages in one frame of [`FRAMES_PER_SAMPLE`].
-pub(super) struct StageClock {
+/// stages in one frame of [`FRAMES_PER_SAMPLE`]; in every frame if all are recorded on a timeline.
+pub(super) struct StageClock<'t> {
+    timeline: Option<&'t Timeline>,
+    /// The worker's number on the timeline.
+    worker: usize,
+    /// The number of the pipeline's frame 0.
+    first_frame: u64,
     last: Instant,
     doing: Doing,
     stages: [Duration; 4],
@@ -36,9 +42,12 @@ pub(super) struct StageClock {
     idle: Duration,
 }
 
-impl StageClock {
-    pub(super) fn start() -> Self {
+impl<'t> StageClock<'t> {
+    pub(super) fn start(timeline: Option<&'t Timeline>, worker: usize, first_frame: u64) -> Self {
         Self {
+            timeline,
+            worker,
+            first_frame,
             last: Instant::now(),
             doing: Doing::Nothing,
             stages: Default::default(),
@@ -53,12 +62,18 @@ impl StageClock {
             return;
         }
         let now = Instant::now();
-        let time = now - std::mem::replace(&mut self.last, now);
+        let began = std::mem::replace(&mut self.last, now);
         *match std::mem::replace(&mut self.doing, doing) {
             Doing::Nothing => &mut self.idle,
-            Doing::Timed(stage) => &mut self.stages[stage as usize],
+            Doing::Timed(stage, frame) => {
+                if let Some(timeline) = self.timeline {
+                    let frame = self.first_frame + u64::from(frame.0);
+                    timeline.record(self.worker, stage, frame, began, now);
+                }
+                &mut self.stages[stage as usize]
+            }
             Doing::Untimed => &mut self.untimed,
-        } += time;
+        } += now - began;
     }
 
     /// The worker found no work, or leaves.
@@ -86,10 +101,10 @@ impl StageClock {
     }
 }
 
-impl Probe for StageClock {
+impl Probe for StageClock<'_> {
     #[inline]
     fn begin(&mut self, work: Work, frame: Frame) {
-        let timed = frame.0.is_multiple_of(FRAMES_PER_SAMPLE);
-        self.turn_to(if timed { Doing::Timed(Stage::of(work)) } else { Doing::Untimed });
+        let timed = self.timeline.is_some() || frame.0.is_multiple_of(FRAMES_PER_SAMPLE);
+        self.turn_to(if timed { Doing::Timed(Stage::of(work), frame) } else { Doing::Untimed });
     }
 }

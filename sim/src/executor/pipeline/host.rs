@@ -14,6 +14,7 @@ use dualframe_core::unit::UnitId;
 use crate::behavior::batch;
 use crate::block::Block;
 use crate::executor::FrameRecord;
+use crate::executor::outside::Outside;
 use crate::executor::world::RECORDS_PER_CANDIDATE;
 use crate::interaction::{Contact, ContactBuffer, Scratch};
 use crate::message::Message;
@@ -24,6 +25,7 @@ use crate::stages::{PairCount, Stages};
 /// What the workers of a run share.
 pub(super) struct Shared<'s> {
     pub(super) stages: &'s Stages,
+    outside: &'s Outside,
     /// The number of the pipeline's frame 0.
     pub(super) first_frame: u64,
     /// The most nodes of a body that workers make room for.
@@ -33,10 +35,15 @@ pub(super) struct Shared<'s> {
 }
 
 impl<'s> Shared<'s> {
-    pub(super) fn new(stages: &'s Stages, first_frame: u64, blocks: &[Block]) -> Self {
+    pub(super) fn new(
+        stages: &'s Stages,
+        outside: &'s Outside,
+        first_frame: u64,
+        blocks: &[Block],
+    ) -> Self {
         let objects = || blocks.iter().flat_map(Block::objects);
         let unit_of = objects().map(|_| AtomicU32::new(0)).collect();
-        Self { stages, first_frame, nodes: batch::most_nodes(objects()), unit_of }
+        Self { stages, outside, first_frame, nodes: batch::most_nodes(objects()), unit_of }
     }
 
     /// Notes that the objects of `block` are in unit `unit`.
@@ -85,7 +92,7 @@ pub(super) struct Host<'s> {
     shared: &'s Shared<'s>,
     scratch: RefCell<Scratch>,
     results: RefCell<ContactBuffer>,
-    letters: RefCell<Vec<(ObjectId, Parcel)>>,
+    letters: RefCell<Vec<Parcel>>,
 }
 
 impl<'s> Host<'s> {
@@ -152,10 +159,15 @@ impl<'s> Environment for Host<'s> {
         let shared = self.shared;
         let letters = &mut *self.letters.borrow_mut();
         letters.clear();
-        while let Some((from, parcel)) = inputs.next_letter() {
-            letters.push((ObjectId(from.sender), parcel));
+        while let Some((_, parcel)) = inputs.next_letter() {
+            letters.push(parcel);
         }
-        let mail = letters.iter().map(|(from, parcel)| (parcel.to, *from, &parcel.message));
+        let number = shared.number(frame);
+        let from_outside = shared.outside.due(number);
+        let mail = |object| {
+            let own = letters.iter().filter(move |parcel| parcel.to == object);
+            own.map(|parcel| &parcel.message).chain(from_outside.to(object))
+        };
         let Unit { block, pairs } = unit;
         *pairs = PairCount::default();
         // The block brings them into its objects' order itself.
@@ -173,7 +185,7 @@ impl<'s> Environment for Host<'s> {
                 outcome = Err(rejected.full);
             }
         };
-        shared.stages.update(shared.number(frame), block, mail, &mut post);
+        shared.stages.update(number, block, mail, &mut post);
         outcome
     }
 
@@ -194,6 +206,7 @@ impl<'s> Environment for Host<'s> {
         screen.renderer.swap(number);
         let pairs = std::mem::take(&mut screen.pairs);
         (screen.on_frame)(&FrameRecord { frame: number, swapped: Instant::now(), pairs });
+        self.shared.outside.swapped(number);
         Ok(())
     }
 }

@@ -35,14 +35,17 @@ pub(super) struct Tables {
 }
 
 impl Tables {
+    /// Tables for these blocks and modelled or possible interactions between them, with room for the
+    /// letters under way and as many again that updates may post.
     pub(super) fn new(
         blocks: &[Block],
         interactions: Vec<InteractionSlot<PairCount>>,
+        under_way: usize,
         homes: usize,
     ) -> Self {
         let objects: usize = blocks.iter().map(|block| block.objects().len()).sum();
         let contacts = 2 * (objects * CONTACTS_PER_OBJECT + FEWEST_CONTACTS);
-        let letters = objects * LETTERS_PER_OBJECT + FEWEST_LETTERS;
+        let letters = (objects * LETTERS_PER_OBJECT + FEWEST_LETTERS).max(2 * under_way);
         let queues = queue_slots(blocks.len(), interactions.len(), letters, homes);
         Self {
             units: Vec::with_capacity(blocks.len()),
@@ -88,14 +91,12 @@ impl Tables {
         self.contacts.len() / 2
     }
 
-    /// Makes room for so many letters, and as many again that updates may post.
-    pub(super) fn reserve_letters(&mut self, posted: usize) {
-        let size = self.letters.len().max(2 * posted);
-        if size > self.letters.len() {
-            self.letters.resize_with(size, LetterSlot::new);
-            let queues = queue_slots(self.units.len(), self.interactions.len(), size, self.homes);
-            self.queues.resize_with(queues, QueueSlot::new);
-        }
+    /// Replaces the interactions.
+    pub(super) fn model(&mut self, interactions: Vec<InteractionSlot<PairCount>>, blocks: usize) {
+        self.interactions = interactions;
+        let letters = self.letters.len();
+        let queues = queue_slots(blocks, self.interactions.len(), letters, self.homes);
+        self.queues.resize_with(queues, QueueSlot::new);
     }
 
     /// Doubles the room for contacts.

@@ -19,15 +19,18 @@ pub use dualframe_core::frame::Entry;
 use self::host::{Parcel, Screen, Shared};
 use self::memory::{Tables, modelled_interactions, spare_interactions};
 use self::run::{Context, Regrouping, Report};
-use super::{Executor, ExecutorError, FrameRecord, StageSeconds};
+use super::outside::Outside;
+use super::{Executor, ExecutorError, FrameRecord, StageSeconds, world};
 use crate::block::Block;
 use crate::blocking::{Blocking, Grain};
-use crate::message::Message;
+use crate::mailbox::Mailbox;
+use crate::message::Letter;
 use crate::object::{Object, ObjectId};
 use crate::pool::{Crew, Pool};
 use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::stages::{PairCount, Stages};
+use crate::timeline::Timeline;
 
 /// Advances an environment by the pipeline. The calling thread is worker number 0 and holds the
 /// render token.
@@ -40,9 +43,11 @@ pub struct PipelineExecutor {
     grain: Grain,
     pool: Arc<Pool>,
     frame: u64,
-    /// Messages for the next frame.
+    /// Objects' messages for the next frame.
     mail: Vec<(From, Parcel)>,
+    outside: Outside,
     seconds: Vec<StageSeconds>,
+    timeline: Option<Arc<Timeline>>,
     failure: Option<TableFull>,
 }
 
@@ -57,7 +62,7 @@ impl PipelineExecutor {
         entry: Entry,
         pool: Arc<Pool>,
     ) -> Result<Self, ExecutorError> {
-        let Scene { objects, stages } = scene;
+        let Scene { objects, stages, frame, mail: under_way, mailbox } = scene;
         let (blocking, blocks) = Blocking::new(objects, grain, pool.threads())?;
         let (broad_phase, interactions) = match grain {
             Grain::Spatial => (BroadPhase::Spatial, spare_interactions(blocks.len())),
@@ -65,17 +70,24 @@ impl PipelineExecutor {
         };
         // As many as there are threads now; whoever joins later shares one.
         let homes = pool.threads().min(MOST_HOMES);
+        let mut mail = Vec::new();
+        let outside = Outside::new(mailbox, under_way, frame, |from, to, message| {
+            let from = From { sender: from.0, sequence: mail.len() as u32 };
+            mail.push((from, Parcel { to, message }));
+        });
         Ok(Self {
-            tables: Tables::new(&blocks, interactions, homes),
+            tables: Tables::new(&blocks, interactions, mail.len(), homes),
             stages,
             blocks,
             blocking,
             config: Config { broad_phase, entry, tokens: 1, homes: homes as u32 },
             grain,
             pool,
-            frame: 0,
-            mail: Vec::new(),
+            frame,
+            mail,
+            outside,
             seconds: Vec::new(),
+            timeline: None,
             failure: None,
         })
     }
@@ -88,14 +100,19 @@ impl PipelineExecutor {
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<u64, ExecutorError> {
         let most_contacts = self.tables.contact_capacity() / 2;
-        let shared = Shared::new(&self.stages, self.frame, &self.blocks);
+        let shared = Shared::new(&self.stages, &self.outside, self.frame, &self.blocks);
         self.tables.load(&mut self.blocks);
-        self.tables.reserve_letters(self.mail.len());
         let crew = Crew::default();
         let pipeline = Pipeline::new(self.tables.lend(), self.config, &crew)?;
         let seconds = std::mem::take(&mut self.seconds);
         let report = Mutex::new(Report { seconds, failure: None });
-        let context = Context { shared: &shared, crew: &crew, pool: &self.pool, report: &report };
+        let context = Context {
+            shared: &shared,
+            crew: &crew,
+            pool: &self.pool,
+            report: &report,
+            timeline: self.timeline.as_deref(),
+        };
         let regrouping = Regrouping {
             blocking: (self.grain == Grain::Spatial).then_some(&mut self.blocking),
             mail: &mut self.mail,
@@ -128,6 +145,7 @@ impl Executor for PipelineExecutor {
         if let Some(full) = self.failure {
             return Err(full.into());
         }
+        self.outside.begin(self.frame);
         while self.frame < end {
             self.run(end - self.frame, renderer, on_frame)?;
             if self.frame < end {
@@ -145,9 +163,32 @@ impl Executor for PipelineExecutor {
         self.blocks.iter().flat_map(Block::objects).for_each(visit);
     }
 
-    fn post(&mut self, to: ObjectId, message: Message) {
-        let from = From { sender: ObjectId::HOST.0, sequence: self.mail.len() as u32 };
-        self.mail.push((from, Parcel { to, message }));
+    fn mailbox(&self) -> &Mailbox {
+        self.outside.mailbox()
+    }
+
+    fn change(&mut self, change: &mut dyn FnMut(&mut Stages)) {
+        if world::changes_pairs(&mut self.stages, change) && self.grain == Grain::Pairwise {
+            let interactions = modelled_interactions(&self.stages, &self.blocks);
+            self.tables.model(interactions, self.blocks.len());
+        }
+    }
+
+    fn into_scene(mut self: Box<Self>) -> Scene {
+        self.mail.sort_unstable_by_key(|(from, parcel)| (parcel.to, from.sender, from.sequence));
+        let due = self.frame;
+        let mail = self.mail.into_iter().map(|(from, Parcel { to, message })| Letter {
+            due,
+            to,
+            from: ObjectId(from.sender),
+            message,
+        });
+        let objects = self.blocks.into_iter().flat_map(|block| block.objects);
+        world::scene(objects, self.stages, due, mail, &self.outside)
+    }
+
+    fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.timeline.get_or_insert(timeline);
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {

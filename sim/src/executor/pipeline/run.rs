@@ -15,6 +15,7 @@ use super::host::{Host, Parcel, Screen, Shared};
 use crate::blocking::{Blocking, FRAMES_PER_BLOCKING};
 use crate::executor::StageSeconds;
 use crate::pool::{Crew, Pool};
+use crate::timeline::Timeline;
 
 type SimPipeline<'m, 's> = Pipeline<'m, Host<'s>, &'s Crew>;
 
@@ -28,7 +29,7 @@ pub(super) struct Report {
 pub(super) struct Regrouping<'x> {
     /// What forms blocks anew, where there are any.
     pub(super) blocking: Option<&'x mut Blocking>,
-    /// Messages for the next frame.
+    /// Objects' messages for the next frame.
     pub(super) mail: &'x mut Vec<(From, Parcel)>,
     pub(super) homes: u32,
     /// Contact records of a frame beyond which the tables are to grow.
@@ -94,6 +95,7 @@ pub(super) struct Context<'s, 'x> {
     pub(super) crew: &'s Crew,
     pub(super) pool: &'x Pool,
     pub(super) report: &'x Mutex<Report>,
+    pub(super) timeline: Option<&'x Timeline>,
 }
 
 impl<'s> Context<'s, '_> {
@@ -201,7 +203,8 @@ impl<'s> Context<'s, '_> {
         host: &Host<'s>,
         token: Option<Token<'p, Screen<'s>>>,
     ) -> Option<Token<'p, Screen<'s>>> {
-        let mut worker = pipeline.worker_at(index as u32).probed(StageClock::start());
+        let clock = StageClock::start(self.timeline, index, self.shared.first_frame);
+        let mut worker = pipeline.worker_at(index as u32).probed(clock);
         if let Some(token) = token
             && let Err(token) = worker.hold(token)
         {
@@ -230,7 +233,7 @@ impl<'s> Context<'s, '_> {
         }
     }
 
-    fn note(self, index: usize, clock: &mut StageClock) {
+    fn note(self, index: usize, clock: &mut StageClock<'_>) {
         let mut report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(seconds) = report.seconds.get_mut(index) {
             clock.stop();

@@ -42,7 +42,10 @@ fn rebuilt(volume: &Volume) -> Volume {
     Volume::new(volume.dims(), volume.spacing(), volume.pose, &densities).expect("as before")
 }
 
-fn bricks(volume: &Volume) -> Vec<([u32; 3], [u32; 3], u8, Vec<u8>)> {
+/// Where a brick begins, its size, its greatest density, all densities.
+type BrickState = ([u32; 3], [u32; 3], u8, Vec<u8>);
+
+fn bricks(volume: &Volume) -> Vec<BrickState> {
     let brick =
         |brick: Brick<'_>| (brick.first(), brick.size, brick.peak, brick.densities.to_vec());
     volume.changed_since(0).map(brick).collect()

@@ -1,0 +1,128 @@
+//! Pictures without a window: of the last frame, or of every one.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::thread::{self, JoinHandle};
+
+use dualframe_render_wgpu::error::GraphicsError;
+use dualframe_render_wgpu::gpu::Gpu;
+use dualframe_render_wgpu::look::{Look, Quality};
+use dualframe_render_wgpu::picture::Picture;
+use dualframe_render_wgpu::renderer::Offscreen;
+use dualframe_sim::geometry::Bounds;
+use dualframe_sim::object::Object;
+use dualframe_sim::render::Renderer;
+
+use super::args::Particles;
+use super::particles::RunError;
+
+/// Pictures that wait to be written; usually 4.
+const WAITING: usize = 4;
+
+/// Draws the frames that pictures are wanted of.
+pub(super) struct Pictures {
+    offscreen: Offscreen,
+    /// The frame being drawn.
+    frame: u64,
+    last: u64,
+    draws_every: bool,
+    picture: Option<PathBuf>,
+    sequence: Option<Sequence>,
+    failure: Option<GraphicsError>,
+}
+
+impl Pictures {
+    /// `None` if no pictures are wanted.
+    pub(super) fn new(args: &Particles, focus: Bounds) -> Result<Option<Self>, RunError> {
+        let draws_every = args.offscreen || args.frames_out.is_some();
+        if !draws_every && args.picture.is_none() {
+            return Ok(None);
+        }
+        let gpu = Gpu::new(args.adapter.as_deref())?;
+        // What is drawn for its speed is drawn as a window would; a picture is to be looked at.
+        let is_for_speed = args.offscreen && args.picture.is_none() && args.frames_out.is_none();
+        let quality = if is_for_speed && gpu.is_software() { Quality::Fast } else { Quality::Fine };
+        let offscreen = Offscreen::new(gpu, Look::room(focus, quality), args.size)?;
+        let sequence = args.frames_out.as_deref().map(Sequence::new).transpose();
+        Ok(Some(Self {
+            offscreen,
+            frame: 0,
+            last: args.frames() - 1,
+            draws_every,
+            picture: args.picture.clone(),
+            sequence: sequence.map_err(RunError::Picture)?,
+            failure: None,
+        }))
+    }
+
+    fn is_wanted(&self) -> bool {
+        self.draws_every || self.frame == self.last
+    }
+
+    /// Writes what is still to be written.
+    pub(super) fn finish(mut self) -> Result<(), RunError> {
+        if let Some(sequence) = self.sequence.take() {
+            sequence.finish().map_err(RunError::Picture)?;
+        }
+        if let Some(failure) = self.failure.or_else(|| self.offscreen.painter.failure()) {
+            return Err(failure.into());
+        }
+        let Some(file) = &self.picture else { return Ok(()) };
+        self.offscreen.picture()?.save(file).map_err(RunError::Picture)
+    }
+}
+
+impl Renderer for Pictures {
+    fn draw(&mut self, object: &Object) {
+        if self.is_wanted() {
+            self.offscreen.draw(object);
+        }
+    }
+
+    fn swap(&mut self, frame: u64) {
+        if self.is_wanted() {
+            self.offscreen.swap(frame);
+            if let Some(sequence) = &self.sequence
+                && self.failure.is_none()
+            {
+                match self.offscreen.picture() {
+                    Ok(picture) => sequence.add(frame, picture),
+                    Err(error) => self.failure = Some(error),
+                }
+            }
+        }
+        self.frame = frame + 1;
+    }
+}
+
+/// Pictures on their way to files, written by a thread of their own.
+struct Sequence {
+    sender: SyncSender<(PathBuf, Picture)>,
+    writer: JoinHandle<io::Result<()>>,
+    folder: PathBuf,
+}
+
+impl Sequence {
+    fn new(folder: &Path) -> io::Result<Self> {
+        fs::create_dir_all(folder)?;
+        let (sender, receiver) = sync_channel::<(PathBuf, Picture)>(WAITING);
+        let write = move || receiver.iter().try_for_each(|(file, picture)| picture.save(&file));
+        let writer = thread::Builder::new().name("pictures".to_owned()).spawn(write)?;
+        Ok(Self { sender, writer, folder: folder.to_owned() })
+    }
+
+    fn add(&self, frame: u64, picture: Picture) {
+        // A writer that has gone says at the end why.
+        let _ = self.sender.send((self.folder.join(format!("frame-{frame:06}.png")), picture));
+    }
+
+    fn finish(self) -> io::Result<()> {
+        drop(self.sender);
+        match self.writer.join() {
+            Ok(written) => written,
+            Err(panic) => std::panic::resume_unwind(panic),
+        }
+    }
+}

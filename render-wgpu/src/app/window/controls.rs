@@ -1,0 +1,64 @@
+//! What the person at the window can change.
+
+use dualframe_render_wgpu::look::Coloring;
+use dualframe_sim::executor::{Entry, ExecutorKind, MAX_THREADS};
+use dualframe_sim::pool::cores;
+
+use crate::app::args::Particles;
+
+/// The most workers that can be asked for at the window: more than anybody has use for.
+pub(in crate::app) fn most_threads() -> usize {
+    MAX_THREADS.min(4 * cores())
+}
+
+/// What the person at the window can change. The overlay writes it; between two runs of frames the
+/// session does what is new in it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Controls {
+    pub(super) is_paused: bool,
+    /// Frames to compute although paused.
+    pub(super) steps: u64,
+    /// Whether simulated time does not run ahead of the clock.
+    pub(super) is_real_time: bool,
+    /// Downwards, in metres per second squared.
+    pub(super) gravity: f32,
+    /// Of the springs between nodes, in newtons per metre.
+    pub(super) stiffness: f32,
+    /// Of springs, in newton seconds per metre.
+    pub(super) damping: f32,
+    pub(super) threads: usize,
+    pub(super) frames_in_flight: u8,
+    pub(super) executor: ExecutorKind,
+    pub(super) coloring: Coloring,
+    /// Particles at the next start.
+    pub(super) objects: usize,
+    /// How often it was started anew.
+    pub(super) restarts: u32,
+    /// Whether the overlay is shown.
+    pub(super) is_shown: bool,
+}
+
+impl Controls {
+    /// What a particle environment starts with; see [`dualframe_sim::scene::ParticleScene`].
+    pub(super) fn new(args: &Particles) -> Self {
+        Self {
+            is_paused: false,
+            steps: 0,
+            is_real_time: true,
+            gravity: if args.gravity { 9.81 } else { 0.0 },
+            stiffness: 60.0,
+            damping: 0.02,
+            threads: args.threads,
+            frames_in_flight: args.frames_in_flight,
+            executor: args.executor,
+            coloring: Coloring::default(),
+            objects: args.objects,
+            restarts: 0,
+            is_shown: true,
+        }
+    }
+
+    pub(super) fn entry(&self) -> Entry {
+        if self.frames_in_flight == 1 { Entry::AfterSwap } else { Entry::AfterUpdate }
+    }
+}

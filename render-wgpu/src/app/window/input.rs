@@ -1,0 +1,135 @@
+//! What the person at the window does.
+
+use std::sync::Arc;
+
+use egui_winit::State;
+use glam::Vec2;
+use winit::application::ApplicationHandler;
+use winit::dpi::LogicalSize;
+use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent};
+use winit::event_loop::ActiveEventLoop;
+use winit::keyboard::{Key, NamedKey};
+use winit::window::{Window, WindowId};
+
+/// Lines of a wheel that one pixel of a touch pad stands for.
+const LINES_PER_PIXEL: f64 = 0.02;
+
+/// Something done with mouse or keyboard outside the overlay.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Gesture {
+    /// The left button went down.
+    Press,
+    /// The left button went up.
+    Release,
+    /// The mouse moved by so many pixels with this button down; downwards is positive.
+    Drag(MouseButton, Vec2),
+    /// The wheel turned by so many lines; away from the person is positive.
+    Wheel(f32),
+    /// Pause, or go on.
+    Pause,
+    /// Compute one frame.
+    Step,
+    /// Look from where one looked at the beginning.
+    ResetCamera,
+    /// Show the overlay, or hide it.
+    Overlay,
+}
+
+/// The window and what has come from it.
+pub(super) struct Input {
+    title: String,
+    size: (u32, u32),
+    pub(super) window: Option<Arc<Window>>,
+    pub(super) egui: Option<State>,
+    /// Why there is no window.
+    pub(super) failure: Option<String>,
+    pub(super) is_closing: bool,
+    /// What was done and not yet looked at.
+    pub(super) gestures: Vec<Gesture>,
+    /// Where the mouse is, in pixels from the upper left.
+    pub(super) cursor: Vec2,
+    held: Option<MouseButton>,
+}
+
+impl Input {
+    pub(super) fn new(title: String, size: (u32, u32)) -> Self {
+        Self {
+            title,
+            size,
+            window: None,
+            egui: None,
+            failure: None,
+            is_closing: false,
+            gestures: Vec::new(),
+            cursor: Vec2::ZERO,
+            held: None,
+        }
+    }
+
+    fn press(&mut self, state: ElementState, button: MouseButton) {
+        let is_down = state == ElementState::Pressed;
+        self.held = is_down.then_some(button);
+        if button == MouseButton::Left {
+            self.gestures.push(if is_down { Gesture::Press } else { Gesture::Release });
+        }
+    }
+
+    fn key(&mut self, event: &KeyEvent) {
+        if event.state != ElementState::Pressed {
+            return;
+        }
+        self.gestures.extend(match event.logical_key.as_ref() {
+            Key::Named(NamedKey::Space) => Some(Gesture::Pause),
+            Key::Named(NamedKey::Home) => Some(Gesture::ResetCamera),
+            Key::Character("n" | "N") => Some(Gesture::Step),
+            Key::Character("h" | "H") => Some(Gesture::Overlay),
+            _ => None,
+        });
+    }
+}
+
+impl ApplicationHandler for Input {
+    fn resumed(&mut self, event_loop: &ActiveEventLoop) {
+        if self.window.is_some() {
+            return;
+        }
+        let (width, height) = self.size;
+        let attributes = Window::default_attributes()
+            .with_title(self.title.clone())
+            .with_inner_size(LogicalSize::new(width, height));
+        match event_loop.create_window(attributes) {
+            Ok(window) => self.window = Some(Arc::new(window)),
+            Err(error) => self.failure = Some(error.to_string()),
+        }
+    }
+
+    fn window_event(&mut self, _: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let Some(window) = &self.window else { return };
+        let is_taken = self.egui.as_mut().is_some_and(|egui| {
+            let response = egui.on_window_event(window, &event);
+            response.consumed
+        });
+        match event {
+            WindowEvent::CloseRequested | WindowEvent::Destroyed => self.is_closing = true,
+            WindowEvent::CursorMoved { position, .. } => {
+                let cursor = Vec2::new(position.x as f32, position.y as f32);
+                let moved = cursor - std::mem::replace(&mut self.cursor, cursor);
+                // What began outside the overlay stays outside it.
+                self.gestures.extend(self.held.map(|button| Gesture::Drag(button, moved)));
+            }
+            WindowEvent::MouseInput { state, button, .. }
+                if !is_taken || state == ElementState::Released =>
+            {
+                self.press(state, button);
+            }
+            WindowEvent::MouseWheel { delta, .. } if !is_taken => {
+                self.gestures.push(Gesture::Wheel(match delta {
+                    MouseScrollDelta::LineDelta(_, lines) => lines,
+                    MouseScrollDelta::PixelDelta(by) => (by.y * LINES_PER_PIXEL) as f32,
+                }));
+            }
+            WindowEvent::KeyboardInput { event, .. } if !is_taken => self.key(&event),
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! The overlay on the device.
+
+use dualframe_render_wgpu::gpu::Gpu;
+use egui::{Context, Ui, ViewportId};
+use egui_wgpu::{Renderer, RendererOptions, ScreenDescriptor};
+use egui_winit::State;
+use wgpu::{
+    CommandBuffer, CommandEncoder, LoadOp, Operations, RenderPassColorAttachment,
+    RenderPassDescriptor, StoreOp, TextureFormat, TextureView,
+};
+use winit::window::Window;
+
+/// Draws egui's output over a picture.
+pub(super) struct OverlayPainter {
+    context: Context,
+    renderer: Renderer,
+}
+
+impl OverlayPainter {
+    pub(super) fn new(gpu: &Gpu, format: TextureFormat) -> Self {
+        let renderer = Renderer::new(&gpu.device, format, RendererOptions::default());
+        let context = Context::default();
+        context.set_visuals(egui::Visuals::dark());
+        Self { context, renderer }
+    }
+
+    /// What turns the window's events into egui's.
+    pub(super) fn input(&self, gpu: &Gpu, window: &Window) -> State {
+        let most = gpu.most_pixels() as usize;
+        State::new(self.context.clone(), ViewportId::ROOT, window, None, None, Some(most))
+    }
+
+    /// Lays out what `show` says and encodes how it is drawn over `picture`. Some commands must be
+    /// submitted before the encoder's.
+    pub(super) fn paint(
+        &mut self,
+        gpu: &Gpu,
+        (window, input): (&Window, &mut State),
+        (encoder, picture): (&mut CommandEncoder, &TextureView),
+        show: impl FnMut(&mut Ui),
+    ) -> Vec<CommandBuffer> {
+        let Gpu { device, queue, .. } = gpu;
+        let mut output = self.context.run_ui(input.take_egui_input(window), show);
+        input.handle_platform_output(window, output.platform_output);
+        for (id, deltas) in &output.textures_delta.set {
+            for delta in deltas {
+                self.renderer.update_texture(device, queue, *id, delta);
+            }
+        }
+        let triangles = self.context.tessellate(output.shapes, output.pixels_per_point);
+        let size = window.inner_size();
+        let screen = ScreenDescriptor {
+            size_in_pixels: [size.width, size.height],
+            pixels_per_point: output.pixels_per_point,
+        };
+        let before = self.renderer.update_buffers(device, queue, encoder, &triangles, &screen);
+        let pass = encoder.begin_render_pass(&RenderPassDescriptor {
+            label: Some("overlay"),
+            color_attachments: &[Some(RenderPassColorAttachment {
+                view: picture,
+                depth_slice: None,
+                resolve_target: None,
+                ops: Operations { load: LoadOp::Load, store: StoreOp::Store },
+            })],
+            ..Default::default()
+        });
+        self.renderer.render(&mut pass.forget_lifetime(), &triangles, &screen);
+        for id in &output.textures_delta.free {
+            self.renderer.free_texture(id);
+        }
+        // What is left of it would be reported as forgotten.
+        output.textures_delta.clear();
+        before
+    }
+}

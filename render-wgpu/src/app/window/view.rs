@@ -1,0 +1,285 @@
+//! What the token's holder draws with: the window, its events and the pace.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use dualframe_render_wgpu::camera::Camera;
+use dualframe_render_wgpu::error::GraphicsError;
+use dualframe_render_wgpu::gpu::Gpu;
+use dualframe_render_wgpu::look::{Look, Quality};
+use dualframe_render_wgpu::picture::{Picture, read_texture};
+use dualframe_render_wgpu::renderer::Painter;
+use dualframe_sim::geometry::Bounds;
+use dualframe_sim::mailbox::Mailbox;
+use dualframe_sim::object::Object;
+use dualframe_sim::render::Renderer;
+use dualframe_sim::timeline::Timeline;
+use glam::Vec2;
+use wgpu::{
+    CommandBuffer, Extent3d, Instance, InstanceDescriptor, Texture, TextureDescriptor,
+    TextureDimension, TextureUsages,
+};
+use winit::event_loop::EventLoop;
+use winit::platform::pump_events::EventLoopExtPumpEvents;
+use winit::window::Window;
+
+use super::controls::Controls;
+use super::hand::Hand;
+use super::input::{Gesture, Input};
+use super::overlay::Overlay;
+use super::pace::Pace;
+use super::paint::OverlayPainter;
+use super::stats::Stats;
+use super::surface::{self, Screen};
+
+/// The window as a renderer.
+pub(super) struct View {
+    event_loop: EventLoop<()>,
+    input: Input,
+    window: Arc<Window>,
+    instance: Instance,
+    screen: Screen,
+    pub(super) painter: Painter,
+    overlay_painter: OverlayPainter,
+    overlay: Overlay,
+    hand: Hand,
+    home: Camera,
+    pub(super) controls: Controls,
+    pub(super) stats: Rc<RefCell<Stats>>,
+    pub(super) timeline: Arc<Timeline>,
+    pub(super) mailbox: Mailbox,
+    /// Whether the frame being drawn is shown. Displays show fewer frames than are computed.
+    is_shown: bool,
+    pace: Pace,
+    failure: Option<GraphicsError>,
+}
+
+/// What a window shows.
+pub(super) struct Shown {
+    pub(super) title: String,
+    pub(super) size: (u32, u32),
+    pub(super) focus: Bounds,
+    pub(super) time_step: Duration,
+    pub(super) timeline: Arc<Timeline>,
+}
+
+impl View {
+    /// Opens a window.
+    ///
+    /// # Errors
+    /// No display, no window, no adapter that can draw to it.
+    pub(super) fn open(
+        shown: Shown,
+        adapter: Option<&str>,
+        controls: Controls,
+    ) -> Result<Self, GraphicsError> {
+        let refused = |reason: String| GraphicsError::Surface { reason };
+        let mut event_loop = EventLoop::new().map_err(|_| GraphicsError::NoDisplay)?;
+        let mut input = Input::new(shown.title, shown.size);
+        event_loop.pump_app_events(Some(Duration::from_millis(100)), &mut input);
+        let window = match (input.window.clone(), input.failure.take()) {
+            (Some(window), _) => window,
+            (None, reason) => return Err(refused(reason.unwrap_or("it did not open".to_owned()))),
+        };
+        let display = Box::new(event_loop.owned_display_handle());
+        let instance = Instance::new(InstanceDescriptor::new_with_display_handle_from_env(display));
+        let surface = surface::create(&instance, &window)?;
+        let gpu = Gpu::for_surface(&instance, &surface, adapter)?;
+        let screen = Screen::new(&gpu, surface, Arc::clone(&window))?;
+        let overlay_painter = OverlayPainter::new(&gpu, screen.format());
+        input.egui = Some(overlay_painter.input(&gpu, &window));
+        let quality = if gpu.is_software() { Quality::Fast } else { Quality::Fine };
+        let look = Look::room(shown.focus, quality);
+        let painter = Painter::new(gpu, look, screen.format(), screen.size())?;
+        let refresh =
+            window.current_monitor().and_then(|monitor| monitor.refresh_rate_millihertz());
+        let refresh = refresh.map(|rate| f64::from(rate.max(1_000)) * 1e-3);
+        Ok(Self {
+            event_loop,
+            input,
+            window,
+            instance,
+            screen,
+            home: painter.camera,
+            painter,
+            overlay_painter,
+            overlay: Overlay::new(),
+            hand: Hand::new(),
+            controls,
+            stats: Rc::new(RefCell::new(Stats::new())),
+            timeline: shown.timeline,
+            mailbox: Mailbox::new(),
+            is_shown: true,
+            pace: Pace::new(refresh, shown.time_step),
+            failure: None,
+        })
+    }
+
+    /// Whether the window is to go.
+    pub(super) fn is_closing(&self) -> bool {
+        self.input.is_closing || self.failure().is_some()
+    }
+
+    /// Why nothing is drawn any more, if so.
+    pub(super) fn failure(&self) -> Option<GraphicsError> {
+        self.failure.clone().or_else(|| self.painter.failure())
+    }
+
+    /// Another environment is shown.
+    pub(super) fn turn_to(&mut self, focus: Bounds, mailbox: Mailbox) {
+        if self.painter.look.focus != focus {
+            self.painter.look.focus = focus;
+            self.painter.camera = Camera::around(&focus);
+            self.home = self.painter.camera;
+        }
+        self.mailbox = mailbox;
+        self.hand = Hand::new();
+    }
+
+    /// Does what the person did, after waiting for it for up to `timeout`.
+    pub(super) fn attend(&mut self, timeout: Duration) {
+        self.event_loop.pump_app_events(Some(timeout), &mut self.input);
+        let mut gestures = std::mem::take(&mut self.input.gestures);
+        for gesture in gestures.drain(..) {
+            self.act(gesture);
+        }
+        // The list keeps its memory.
+        self.input.gestures = gestures;
+        let (point, aspect) = (self.point(), self.aspect());
+        self.hand.hold(&self.painter, &self.mailbox, point, aspect);
+        if self.screen.follow(self.painter.gpu()) {
+            let (width, height) = self.screen.size();
+            if let Err(error) = self.painter.resize(width, height) {
+                self.failure = Some(error);
+            }
+        }
+        self.painter.look.coloring = self.controls.coloring;
+    }
+
+    fn act(&mut self, gesture: Gesture) {
+        let Self { hand, painter, controls, .. } = self;
+        match gesture {
+            Gesture::Press => {
+                let point = self.point();
+                self.hand.press(&self.painter, point);
+            }
+            Gesture::Release => hand.release(&self.mailbox),
+            Gesture::Drag(button, by) => {
+                let height = painter.size().1 as f32;
+                hand.drag(painter, button, by / height);
+            }
+            Gesture::Wheel(lines) => hand.wheel(painter, lines),
+            Gesture::Pause => controls.is_paused = !controls.is_paused,
+            Gesture::Step => controls.steps += u64::from(controls.is_paused),
+            Gesture::ResetCamera => painter.camera = self.home,
+            Gesture::Overlay => controls.is_shown = !controls.is_shown,
+        }
+    }
+
+    /// Where the mouse is, from (−1, −1) at the lower left to (1, 1).
+    fn point(&self) -> Vec2 {
+        let (width, height) = self.painter.size();
+        let share = self.input.cursor / Vec2::new(width as f32, height as f32);
+        Vec2::new(2.0 * share.x - 1.0, 1.0 - 2.0 * share.y)
+    }
+
+    fn aspect(&self) -> f32 {
+        let (width, height) = self.painter.size();
+        width as f32 / height as f32
+    }
+
+    /// The objects that come next are shown.
+    pub(super) fn show_next(&mut self) {
+        self.is_shown = true;
+    }
+
+    /// Time stood still: what was missed is not made up for.
+    pub(super) fn interrupt(&mut self) {
+        self.pace.interrupt();
+        self.stats.borrow_mut().interrupt();
+    }
+
+    /// Draws what was taken, and the overlay, and presents both.
+    fn present(&mut self) -> Result<(), GraphicsError> {
+        let begun = Instant::now();
+        let gpu = self.painter.gpu();
+        let texture = match self.screen.is_visible() {
+            true => self.screen.next(gpu, &self.instance)?,
+            false => None,
+        };
+        let Some(texture) = texture else {
+            self.painter.discard();
+            return Ok(());
+        };
+        let commands = self.encode(&texture.texture);
+        let gpu = self.painter.gpu();
+        gpu.queue.submit(commands);
+        self.window.pre_present_notify();
+        gpu.queue.present(texture);
+        self.pace.shown(gpu, begun);
+        Ok(())
+    }
+
+    /// Encodes how what was taken, and the overlay, is drawn to a texture of the window's format and size.
+    fn encode(&mut self, texture: &Texture) -> Vec<CommandBuffer> {
+        let picture = texture.create_view(&Default::default());
+        let mut encoder = self.painter.gpu().device.create_command_encoder(&Default::default());
+        self.painter.paint(&mut encoder, &picture);
+        let Self { painter, overlay_painter, overlay, input, controls, stats, timeline, .. } = self;
+        let mut commands = match &mut input.egui {
+            Some(egui) => overlay_painter.paint(
+                painter.gpu(),
+                (&self.window, egui),
+                (&mut encoder, &picture),
+                |ui| overlay.show(ui, controls, &stats.borrow(), timeline),
+            ),
+            None => Vec::new(),
+        };
+        commands.push(encoder.finish());
+        commands
+    }
+
+    /// What the window shows of what was taken.
+    pub(super) fn picture(&mut self) -> Result<Picture, GraphicsError> {
+        let (width, height) = self.painter.size();
+        let texture = self.painter.gpu().device.create_texture(&TextureDescriptor {
+            label: Some("picture of the window"),
+            size: Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: TextureDimension::D2,
+            format: self.screen.format(),
+            usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let commands = self.encode(&texture);
+        self.painter.gpu().queue.submit(commands);
+        read_texture(self.painter.gpu(), &texture)
+    }
+
+    /// Draws what was taken.
+    pub(super) fn redraw(&mut self) {
+        if let Err(error) = self.present() {
+            self.failure = Some(error);
+        }
+    }
+}
+
+impl Renderer for View {
+    fn draw(&mut self, object: &Object) {
+        if self.is_shown {
+            self.painter.add(object);
+        }
+    }
+
+    fn swap(&mut self, _frame: u64) {
+        if self.is_shown && self.failure().is_none() {
+            self.redraw();
+        }
+        self.attend(Duration::ZERO);
+        self.pace.keep(self.controls.is_real_time);
+        self.is_shown = self.pace.shows(self.painter.gpu());
+    }
+}

@@ -1,0 +1,188 @@
+//! GPU work besides drawing: the auxiliary queue of the render stage (§9).
+//!
+//! Anybody may submit a unit from any thread; whoever holds the render token runs it, since nobody else
+//! may call the device.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+
+use thiserror::Error;
+use wgpu::{Buffer, CommandEncoder, MapMode, PollType};
+
+use crate::error::GraphicsError;
+use crate::globals::View;
+use crate::gpu::Gpu;
+use crate::pick::Picker;
+use crate::surface::Surfaces;
+
+/// Units that may wait at once; usually 256.
+const CAPACITY: usize = 256;
+
+/// A unit of GPU work.
+pub trait GpuUnit: Send {
+    /// Whether it looks at the frame that was drawn: such a unit runs when the next frame is, others as
+    /// soon as the token's holder comes to it.
+    fn needs_frame(&self) -> bool {
+        false
+    }
+
+    /// Encodes what it does, its results into a buffer that can be mapped for reading.
+    fn encode(&mut self, context: &Context<'_>, encoder: &mut CommandEncoder) -> Buffer;
+
+    /// Told, on the token holder's thread, what is in that buffer once the device is done, or why it
+    /// never will be.
+    fn finish(self: Box<Self>, context: &Context<'_>, results: Result<&[u8], GraphicsError>);
+}
+
+/// What a unit may use.
+pub struct Context<'a> {
+    /// The device.
+    pub gpu: &'a Gpu,
+    pub(crate) view: &'a View,
+    pub(crate) size: (u32, u32),
+    pub(crate) surfaces: &'a Surfaces,
+    pub(crate) picker: &'a Picker,
+}
+
+/// The queue is full, and the unit came back.
+#[derive(Error)]
+#[error("{CAPACITY} units of GPU work wait already")]
+pub struct AuxiliaryFull(pub Box<dyn GpuUnit>);
+
+impl std::fmt::Debug for AuxiliaryFull {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("AuxiliaryFull")
+    }
+}
+
+/// Where units of GPU work are submitted.
+#[derive(Clone)]
+pub struct Auxiliary(SyncSender<Box<dyn GpuUnit>>);
+
+impl Auxiliary {
+    /// Submits a unit. If the renderer is gone it is dropped.
+    ///
+    /// # Errors
+    /// Too many wait already.
+    pub fn submit(&self, unit: Box<dyn GpuUnit>) -> Result<(), AuxiliaryFull> {
+        match self.0.try_send(unit) {
+            Ok(()) | Err(TrySendError::Disconnected(_)) => Ok(()),
+            Err(TrySendError::Full(unit)) => Err(AuxiliaryFull(unit)),
+        }
+    }
+}
+
+/// How far the mapping of a buffer has come.
+const MAPPING: u8 = 0;
+const MAPPED: u8 = 1;
+const FAILED: u8 = 2;
+
+/// A unit whose commands are under way.
+struct Encoded {
+    unit: Box<dyn GpuUnit>,
+    results: Buffer,
+    state: Arc<AtomicU8>,
+}
+
+impl Encoded {
+    fn is_done(&self) -> bool {
+        // Acquire: with the Release of the mapping's callback, though the bytes are the device's.
+        self.state.load(Ordering::Acquire) != MAPPING
+    }
+
+    fn finish(self, context: &Context<'_>) {
+        let failed = || {
+            let reason = "its results cannot be read".to_owned();
+            context.gpu.failure().unwrap_or(GraphicsError::Lost { reason })
+        };
+        if self.state.load(Ordering::Acquire) == FAILED {
+            return self.unit.finish(context, Err(failed()));
+        }
+        match self.results.get_mapped_range(..) {
+            Ok(bytes) => self.unit.finish(context, Ok(&bytes)),
+            Err(_) => self.unit.finish(context, Err(failed())),
+        }
+    }
+}
+
+/// The token holder's end of the queue.
+pub(crate) struct Units {
+    sender: SyncSender<Box<dyn GpuUnit>>,
+    receiver: Receiver<Box<dyn GpuUnit>>,
+    /// Those that wait for a frame.
+    for_frame: Vec<Box<dyn GpuUnit>>,
+    encoded: Vec<Encoded>,
+}
+
+impl Units {
+    pub(crate) fn new() -> Self {
+        let (sender, receiver) = sync_channel(CAPACITY);
+        Self { sender, receiver, for_frame: Vec::new(), encoded: Vec::new() }
+    }
+
+    pub(crate) fn queue(&self) -> Auxiliary {
+        Auxiliary(self.sender.clone())
+    }
+
+    /// Encodes what waits after a frame was drawn.
+    pub(crate) fn encode(&mut self, context: &Context<'_>, encoder: &mut CommandEncoder) {
+        self.for_frame.extend(self.receiver.try_iter());
+        for unit in self.for_frame.drain(..) {
+            self.encoded.push(encode(unit, context, encoder));
+        }
+    }
+
+    /// Finishes what the device is done with, without waiting.
+    pub(crate) fn finish(&mut self, context: &Context<'_>) {
+        if self.encoded.is_empty() {
+            return;
+        }
+        // A failure is noted by the device's own callbacks.
+        let _ = context.gpu.device.poll(PollType::Poll);
+        for encoded in self.encoded.extract_if(.., |encoded| encoded.is_done()) {
+            encoded.finish(context);
+        }
+    }
+
+    /// Runs what waits and needs no frame, all at once, and waits for the results.
+    pub(crate) fn run_now(&mut self, context: &Context<'_>) {
+        let mut now = Vec::new();
+        for unit in self.receiver.try_iter() {
+            if unit.needs_frame() {
+                self.for_frame.push(unit);
+            } else {
+                now.push(unit);
+            }
+        }
+        if now.is_empty() {
+            return;
+        }
+        let Gpu { device, queue, .. } = context.gpu;
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let encode = |unit| encode(unit, context, &mut encoder);
+        let encoded: Vec<_> = now.into_iter().map(encode).collect();
+        queue.submit([encoder.finish()]);
+        // A failure is noted by the device's own callbacks.
+        let _ = device.poll(PollType::wait_indefinitely());
+        for encoded in encoded {
+            encoded.finish(context);
+        }
+    }
+}
+
+fn encode(
+    mut unit: Box<dyn GpuUnit>,
+    context: &Context<'_>,
+    encoder: &mut CommandEncoder,
+) -> Encoded {
+    let results = unit.encode(context, encoder);
+    let state = Arc::new(AtomicU8::new(MAPPING));
+    let told = Arc::clone(&state);
+    encoder.map_buffer_on_submit(&results, MapMode::Read, .., move |mapped| {
+        let state = if mapped.is_ok() { MAPPED } else { FAILED };
+        // Release: with the Acquire of whoever asks.
+        told.store(state, Ordering::Release);
+    });
+    Encoded { unit, results, state }
+}
