@@ -12,14 +12,14 @@ struct Grid {
     step: f32,
     // The distances between voxels, in metres.
     spacing: vec3f,
-    // The bricks' side, in voxels.
-    brick: f32,
+    // The cells' side, in voxels.
+    cell: f32,
     color: vec4f,
 }
 
 @group(1) @binding(0) var<uniform> grid: Grid;
 @group(1) @binding(1) var densities: texture_3d<f32>;
-// The greatest density of each brick.
+// The greatest density that is interpolated in each cell. A cell begins at the middle of its first voxel.
 @group(1) @binding(2) var peaks: texture_3d<f32>;
 @group(1) @binding(3) var linear_sampler: sampler;
 
@@ -93,25 +93,20 @@ fn refined(ray: Ray, first: f32, last: f32) -> f32 {
 
 // Where a ray first meets the surface before `last`: 0 if it begins inside, −1 if nowhere.
 fn march(ray: Ray, last: f32, step: f32) -> f32 {
-    let sides = sides();
+    let last_cell = vec3f(textureDimensions(peaks)) - 1.0;
     var at = 0.0;
     var before = 0.0;
     while at < last {
         let place = ray.origin + ray.direction * at;
-        let brick = clamp(floor(place / grid.brick), vec3f(0.0), ceil(sides / grid.brick) - 1.0);
-        let low = brick * grid.brick;
-        let high = min(low + grid.brick, sides);
-        var end = at;
-        if textureLoad(peaks, vec3i(brick), 0).r < SURFACE {
-            // Between the middles of a brick's voxels the densities are only its own.
-            let empty = crossing(ray, low + 0.5, high - 0.5);
-            if empty.x <= at && at < empty.y {
-                before = empty.y;
-                at = empty.y + 0.01;
-                continue;
-            }
-        } else {
-            end = min(crossing(ray, low, high).y, last);
+        let cell = clamp(floor((place - 0.5) / grid.cell), vec3f(0.0), last_cell);
+        // Beyond the outer voxels' middles, nothing new is interpolated.
+        let low = select(cell * grid.cell + 0.5, vec3f(-1e5), cell == vec3f(0.0));
+        let high = select((cell + 1.0) * grid.cell + 0.5, vec3f(1e5), cell == last_cell);
+        let end = min(crossing(ray, low, high).y, last);
+        if textureLoad(peaks, vec3i(cell), 0).r < SURFACE {
+            before = max(end, at);
+            at = before + 0.01;
+            continue;
         }
         // At least one step, so that every turn of the loop leads on.
         loop {

@@ -8,6 +8,7 @@ use wgpu::{
     TextureDescriptor, TextureDimension, TextureFormat, TextureUsages,
 };
 
+use super::cells::{CELL, Cells};
 use super::pipelines::Pipelines;
 use crate::error::GraphicsError;
 
@@ -22,7 +23,7 @@ struct Numbers {
     place: [f32; 3],
     step: f32,
     spacing: [f32; 3],
-    brick: f32,
+    cell: f32,
     color: [f32; 4],
 }
 
@@ -32,9 +33,9 @@ pub(super) struct Grid {
     /// The volume's revision that the device has; 0 for none.
     revision: u64,
     densities: Texture,
-    /// The greatest density of each brick.
+    /// The greatest density in each cell.
     peaks: Texture,
-    staged_peaks: Vec<u8>,
+    cells: Cells,
     /// A row of bricks in rows of voxels.
     staged: Vec<u8>,
     numbers: Buffer,
@@ -53,8 +54,9 @@ impl Grid {
         if dims.iter().any(|&dim| dim > most) {
             return Err(GraphicsError::Volume { dims, most });
         }
+        let cells = Cells::new(dims);
         let densities = texture(device, "densities", dims);
-        let peaks = texture(device, "peaks", volume.brick_counts());
+        let peaks = texture(device, "peaks", cells.counts);
         let numbers = device.create_buffer(&BufferDescriptor {
             label: Some("volume"),
             size: size_of::<Numbers>() as u64,
@@ -75,20 +77,8 @@ impl Grid {
                 },
             ],
         });
-        let bricks = volume.brick_counts().map(|count| count as usize);
-        let staged_peaks = vec![0; bricks.iter().product()];
-        let staged = vec![0; bricks[0] * BRICK_VOXELS];
-        Ok(Self {
-            dims,
-            revision: 0,
-            densities,
-            peaks,
-            staged_peaks,
-            staged,
-            numbers,
-            bound,
-            used: 0,
-        })
+        let staged = vec![0; volume.brick_counts()[0] as usize * BRICK_VOXELS];
+        Ok(Self { dims, revision: 0, densities, peaks, cells, staged, numbers, bound, used: 0 })
     }
 
     /// Whether it may hold an earlier state of a volume. The textures of one that it is not are new,
@@ -104,7 +94,7 @@ impl Grid {
             place: volume.pose.translation.to_array(),
             step,
             spacing: volume.spacing().to_array(),
-            brick: BRICK_SIDE as f32,
+            cell: CELL as f32,
             color,
         };
         queue.write_buffer(&self.numbers, 0, bytemuck::bytes_of(&numbers));
@@ -118,6 +108,7 @@ impl Grid {
         let mut begin = None;
         while let Some(brick) = bricks.next() {
             self.stage(&brick);
+            self.cells.take(&brick);
             // Bricks in a row are sent by one call: each is a buffer of the device's own.
             let first = *begin.get_or_insert(brick.first());
             let [x, y, z] = brick.place;
@@ -127,18 +118,17 @@ impl Grid {
             }
         }
         drop(bricks);
-        self.send_peaks(queue, volume.brick_counts());
+        self.cells.refresh();
+        self.send_peaks(queue);
         self.revision = volume.revision();
     }
 
     /// Puts a brick into its place in a row of bricks.
     fn stage(&mut self, brick: &Brick<'_>) {
-        let [wide, high, _] = self.dims.map(|dim| dim.div_ceil(BRICK_SIDE) as usize);
-        let [x, y, z] = brick.place.map(|place| place as usize);
-        self.staged_peaks[(z * high + y) * wide + x] = brick.peak;
+        let wide = self.dims[0].div_ceil(BRICK_SIDE) as usize;
         let (rows, _) = self.staged.as_chunks_mut::<{ BRICK_SIDE as usize }>();
         let (from, _) = brick.densities.as_chunks::<{ BRICK_SIDE as usize }>();
-        for (to, from) in rows.iter_mut().skip(x).step_by(wide).zip(from) {
+        for (to, from) in rows.iter_mut().skip(brick.place[0] as usize).step_by(wide).zip(from) {
             *to = *from;
         }
     }
@@ -158,14 +148,14 @@ impl Grid {
         queue.write_texture(to, &self.staged, layout, extent([width, height, depth]));
     }
 
-    fn send_peaks(&self, queue: &Queue, bricks: [u32; 3]) {
+    fn send_peaks(&self, queue: &Queue) {
+        let Cells { counts, peaks, .. } = &self.cells;
         let layout = TexelCopyBufferLayout {
             offset: 0,
-            bytes_per_row: Some(bricks[0]),
-            rows_per_image: Some(bricks[1]),
+            bytes_per_row: Some(counts[0]),
+            rows_per_image: Some(counts[1]),
         };
-        let to = self.peaks.as_image_copy();
-        queue.write_texture(to, &self.staged_peaks, layout, extent(bricks));
+        queue.write_texture(self.peaks.as_image_copy(), peaks, layout, extent(*counts));
     }
 }
 

@@ -3,6 +3,7 @@
 //! A volume's densities are a texture, of which only the bricks that changed are sent again. Its surface
 //! is found by the fragment shader, with a depth of its own; see `volume.wgsl`.
 
+mod cells;
 mod grid;
 mod pipelines;
 
