@@ -84,7 +84,11 @@ mod tests {
             let only = Stages::NONE.with_if(stage, true);
             assert!(!only.is_empty() && Stages::NONE.is_empty());
             assert_eq!(Stages::NONE.with_if(stage, false), Stages::NONE);
-            assert_eq!((only.with_if(stage, true), only.union(only)), (only, only), "once is enough");
+            assert_eq!(
+                (only.with_if(stage, true), only.union(only)),
+                (only, only),
+                "once is enough"
+            );
             for other in Stage::ALL {
                 let both = only.with_if(other, true);
                 assert_eq!(both, only.union(Stages::NONE.with_if(other, true)));
