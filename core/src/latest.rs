@@ -197,4 +197,22 @@ mod tests {
             }
         }
     }
+    #[test]
+    fn nobody_writes_where_somebody_reads() {
+        let mut cell = Latest::<u32, 4>::new(0);
+        for round in 1..4 {
+            let (mut writer, readers) = cell.split();
+            let mut early = reader(&readers);
+            let before = early.read();
+            writer.publish(100 * round);
+            let mut late = reader(&readers);
+            let after = late.read();
+            (1..20).for_each(|value| writer.publish(100 * round + value));
+            for (reader, value) in [(&early, before), (&late, after)] {
+                // SAFETY: the reader is inside the slot.
+                let kept = unsafe { readers.cell.slot(reader.inside).value.with(|kept| *kept) };
+                assert_eq!(kept, value);
+            }
+        }
+    }
 }
