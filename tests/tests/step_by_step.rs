@@ -19,28 +19,37 @@ use dualframe_core::unit::{InteractionId, UnitId, Work};
 use dualframe_core::wait::{Bell, Epoch, Waiting};
 use dualframe_core::worker::{Step, Worker};
 
-/// Every two units meet, or none do. Interactions push two records; letters are left unread.
+/// Every two units meet, or none do. Interactions push two records.
 struct Crowd {
     near: bool,
+    /// Whether each unit writes itself two letters in each frame; otherwise letters are left unread.
+    writes: bool,
+}
+
+/// What a unit found in its last update: whom it met, and its letters.
+#[derive(Default)]
+struct Found {
+    met: Vec<u32>,
+    read: Vec<(From, &'static str)>,
 }
 
 impl Environment for Crowd {
-    type Object = ();
+    type Object = Found;
     type Interaction = ();
     type Contact = u8;
     type Message = &'static str;
     type Renderer = ();
     type Error = TableFull;
 
-    fn broad_phase(&self, (): &(), (): &()) -> bool {
+    fn broad_phase(&self, _: &Found, _: &Found) -> bool {
         self.near
     }
 
     fn interact(
         &self,
         _: Pair,
-        (): &(),
-        (): &(),
+        _: &Found,
+        _: &Found,
         (): &mut (),
         contacts: &mut Contacts<'_, '_, u8>,
     ) -> Result<(), TableFull> {
@@ -49,15 +58,22 @@ impl Environment for Crowd {
 
     fn update(
         &self,
-        _: UnitId,
+        unit: UnitId,
         _: Frame,
-        (): &mut (),
-        _: &mut Inputs<'_, '_, Self>,
+        found: &mut Found,
+        inputs: &mut Inputs<'_, '_, Self>,
     ) -> Result<(), TableFull> {
+        found.met = inputs.interactions().map(|interaction| interaction.other.0).collect();
+        if self.writes {
+            found.read = std::iter::from_fn(|| inputs.next_letter()).collect();
+            for message in ["first", "second"] {
+                inputs.post(unit, unit.0, message).map_err(|rejected| rejected.full)?;
+            }
+        }
         Ok(())
     }
 
-    fn render(&self, _: UnitId, _: Frame, (): &(), (): &mut ()) -> Result<(), TableFull> {
+    fn render(&self, _: UnitId, _: Frame, _: &Found, (): &mut ()) -> Result<(), TableFull> {
         Ok(())
     }
 
@@ -66,8 +82,8 @@ impl Environment for Crowd {
     }
 }
 
-const NEAR: Crowd = Crowd { near: true };
-const FAR: Crowd = Crowd { near: false };
+const NEAR: Crowd = Crowd { near: true, writes: false };
+const FAR: Crowd = Crowd { near: false, writes: false };
 
 /// Comes back at once, and notes whose bell was to be slept on: `true` is the holders'.
 #[derive(Default)]
@@ -89,7 +105,7 @@ impl Waiting for Notes {
 
 type Machine<'m, 'n> = Pipeline<'m, Crowd, &'n Notes>;
 
-/// Hands on a pipeline of `units`, which has room for one letter.
+/// Hands on a pipeline of `units`, which has room for two letters.
 fn with<R>(
     units: usize,
     homes: u32,
@@ -97,13 +113,13 @@ fn with<R>(
     then: impl FnOnce(Machine<'_, '_>, &Notes) -> R,
 ) -> R {
     let pairs = units * (units - 1);
-    let queues = queue_slots(units, pairs, 1, homes as usize);
+    let queues = queue_slots(units, pairs, 2, homes as usize);
     let memory = Memory {
-        units: &mut Vec::from_iter((0..units).map(|_| UnitSlot::new(()))),
+        units: &mut Vec::from_iter((0..units).map(|_| UnitSlot::new(Found::default()))),
         interactions: &mut Vec::from_iter((0..pairs).map(|_| InteractionSlot::spare(()))),
         contacts: &mut Vec::from_iter((0..2 * pairs).map(|_| ContactSlot::new())),
         segments: &mut Vec::from_iter((0..2 * pairs).map(|_| SegmentSlot::new())),
-        letters: &mut [LetterSlot::new()],
+        letters: &mut [const { LetterSlot::new() }; 2],
         queues: &mut Vec::from_iter((0..queues).map(|_| QueueSlot::new())),
     };
     let notes = Notes::default();
@@ -344,10 +360,34 @@ fn a_letter_that_is_not_read_leaves_room_for_another() {
     with(1, 1, 1, |mut pipeline, _| {
         for sequence in 0..3 {
             let from = From { sender: 0, sequence };
-            assert_eq!(pipeline.post(UnitId(0), from, "nothing"), Ok(()));
+            for _ in 0..2 {
+                assert_eq!(pipeline.post(UnitId(0), from, "nothing"), Ok(()));
+            }
             assert!(pipeline.post(UnitId(0), from, "too much").is_err());
             pipeline.run(1).expect("at rest");
             finish(&pipeline, &FAR);
         }
+    });
+}
+
+#[test]
+fn interactions_come_in_pair_order() {
+    with(5, 1, 1, |mut pipeline, _| {
+        pipeline.run(2).expect("at rest");
+        finish(&pipeline, &NEAR);
+        for (unit, found) in (0..).zip(pipeline.objects_mut()) {
+            assert!(found.met.iter().copied().eq((0..5).filter(|&other| other != unit)));
+        }
+    });
+}
+
+#[test]
+fn letters_of_one_update_keep_their_order() {
+    with(1, 1, 1, |mut pipeline, _| {
+        pipeline.run(3).expect("at rest");
+        finish(&pipeline, &Crowd { near: false, writes: true });
+        let from = |sequence| From { sender: 0, sequence };
+        let found = pipeline.objects_mut().next().map(|found| found.read.as_slice());
+        assert_eq!(found, Some(&[(from(0), "first"), (from(1), "second")][..]));
     });
 }
