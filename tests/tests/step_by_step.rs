@@ -1,8 +1,8 @@
-//! What workers do first, what they carry and share, and when they sleep: seen step by step, on one
-//! thread, since none of it changes what comes out.
+//! What workers do first, what they carry and share, and whom they wake: seen step by step, on one
+//! thread (others only sleep), since none of it changes what comes out.
 #![forbid(unsafe_code)]
 
-use std::sync::Mutex;
+use std::sync::{Barrier, Mutex};
 
 use dualframe_core::contacts::{ContactSlot, Contacts, SegmentSlot};
 use dualframe_core::environment::{Environment, Pair};
@@ -85,22 +85,39 @@ impl Environment for Crowd {
 const NEAR: Crowd = Crowd { near: true, writes: false };
 const FAR: Crowd = Crowd { near: false, writes: false };
 
-/// Comes back at once, and notes whose bell was to be slept on: `true` is the holders'.
+/// Notes on whose bell somebody was to sleep, and how many were to be woken; `true` is the holders'.
 #[derive(Default)]
-struct Notes(Mutex<Vec<bool>>);
+struct Notes {
+    slept: Mutex<Vec<bool>>,
+    woken: Mutex<Vec<(bool, u32)>>,
+    /// Passed by all when the sleepers sleep, and again when they may wake. Nobody sleeps without it.
+    night: Option<Barrier>,
+}
 
 impl Notes {
-    fn take(&self) -> Vec<bool> {
-        std::mem::take(&mut *self.0.lock().expect("no poison"))
+    fn slept(&self) -> Vec<bool> {
+        std::mem::take(&mut *self.slept.lock().expect("no poison"))
+    }
+
+    fn woken(&self) -> Vec<(bool, u32)> {
+        std::mem::take(&mut *self.woken.lock().expect("no poison"))
+    }
+
+    fn pass(&self) {
+        let _leader = self.night.as_ref().map(Barrier::wait);
     }
 }
 
 impl Waiting for Notes {
     fn sleep(&self, bell: &Bell, _: Epoch) {
-        self.0.lock().expect("no poison").push(bell.is_for_holders());
+        self.slept.lock().expect("no poison").push(bell.is_for_holders());
+        self.pass();
+        self.pass();
     }
 
-    fn wake(&self, _: &Bell, _: u32) {}
+    fn wake(&self, bell: &Bell, count: u32) {
+        self.woken.lock().expect("no poison").push((bell.is_for_holders(), count));
+    }
 }
 
 type Machine<'m, 'n> = Pipeline<'m, Crowd, &'n Notes>;
@@ -110,6 +127,16 @@ fn with<R>(
     units: usize,
     homes: u32,
     tokens: u32,
+    then: impl FnOnce(Machine<'_, '_>, &Notes) -> R,
+) -> R {
+    with_notes(units, homes, tokens, &Notes::default(), then)
+}
+
+fn with_notes<R>(
+    units: usize,
+    homes: u32,
+    tokens: u32,
+    notes: &Notes,
     then: impl FnOnce(Machine<'_, '_>, &Notes) -> R,
 ) -> R {
     let pairs = units * (units - 1);
@@ -122,9 +149,8 @@ fn with<R>(
         letters: &mut [const { LetterSlot::new() }; 2],
         queues: &mut Vec::from_iter((0..queues).map(|_| QueueSlot::new())),
     };
-    let notes = Notes::default();
     let config = Config { homes, tokens, ..Config::default() };
-    then(Pipeline::new(memory, config, &notes).expect("tables that fit"), &notes)
+    then(Pipeline::new(memory, config, notes).expect("tables that fit"), notes)
 }
 
 fn hold<'p>(pipeline: &'p Machine<'_, '_>, worker: &mut Worker<'p, '_, Crowd, &Notes>) {
@@ -227,8 +253,9 @@ fn what_is_carried_is_shared_with_the_hungry() {
                 // Both carry off what there is to be had before anyone comes.
                 assert_eq!((a.step(&NEAR), a.step(&NEAR)), (ENTERED, ENTERED));
                 assert_eq!((b.step(&NEAR), b.step(&NEAR)), (IDLE, IDLE));
-                assert_eq!(a.step(&NEAR), INTERACTED, "the first is its own in any case");
+                assert_eq!(a.step(&NEAR), INTERACTED);
                 assert_eq!(b.step(&NEAR), UPDATED, "the second is for whoever is hungry");
+                assert_eq!(b.step(&NEAR), IDLE, "and the first is not");
                 assert_eq!(a.step(&NEAR), UPDATED);
             } else {
                 let steps = [a.step(&NEAR), a.step(&NEAR), a.step(&NEAR)];
@@ -242,6 +269,17 @@ fn what_is_carried_is_shared_with_the_hungry() {
             drop((a, b));
             finish(&pipeline, &NEAR);
         }
+    });
+}
+
+#[test]
+fn what_is_carried_stays_while_nobody_is_hungry() {
+    with(3, 1, 1, |mut pipeline, _| {
+        pipeline.run(1).expect("at rest");
+        let (mut a, mut b) = (pipeline.worker(), pipeline.worker());
+        let steps = [(); 5].map(|()| a.step(&NEAR));
+        assert_eq!(steps, [ENTERED, ENTERED, INTERACTED, ENTERED, INTERACTED]);
+        assert_eq!(b.step(&NEAR), IDLE, "an interaction and an update are carried");
     });
 }
 
@@ -297,7 +335,7 @@ fn nobody_wakes_without_cause() {
         let worker = pipeline.worker();
         assert!(worker.has_cause_to_wake(), "it is at rest");
         worker.wait();
-        assert_eq!(notes.take(), [], "and nobody would call");
+        assert_eq!(notes.slept(), [], "and nobody would call");
         drop(worker);
         pipeline.run(1).expect("at rest");
         let (mut a, b) = (pipeline.worker(), pipeline.worker());
@@ -306,7 +344,7 @@ fn nobody_wakes_without_cause() {
         assert_eq!(a.step(&FAR), IDLE, "it cannot render");
         assert!(!b.has_cause_to_wake());
         b.wait();
-        assert_eq!(notes.take(), [false]);
+        assert_eq!(notes.slept(), [false]);
         hold(&pipeline, &mut a);
         assert!(a.has_cause_to_wake() && !b.has_cause_to_wake());
         assert_eq!(a.step(&FAR), RENDERED);
@@ -321,8 +359,64 @@ fn nobody_wakes_without_cause() {
         assert!(!b.has_cause_to_wake());
         a.wait();
         b.wait();
-        assert_eq!(notes.take(), [true], "the holder slept, on the holders' bell");
+        assert_eq!(notes.slept(), [true], "the holder slept, on the holders' bell");
     });
+}
+
+/// Who is called by each of so many steps of a worker that carries the interaction of two units, and
+/// then by its leaving, while two others sleep that found nothing to do.
+fn called(they_hold: bool, it_holds: bool, frames: u32, steps: usize) -> Vec<Vec<(bool, u32)>> {
+    let notes = Notes { night: Some(Barrier::new(3)), ..Notes::default() };
+    with_notes(2, 1, 3, &notes, |mut pipeline, notes| {
+        pipeline.run(frames).expect("at rest");
+        let pipeline = &pipeline;
+        let mut worker = pipeline.worker();
+        assert_eq!([worker.step(&NEAR), worker.step(&NEAR)], [ENTERED, ENTERED]);
+        if it_holds {
+            hold(pipeline, &mut worker);
+        }
+        std::thread::scope(|scope| {
+            for _ in 0..2 {
+                scope.spawn(|| {
+                    let mut sleeper = pipeline.worker();
+                    if they_hold {
+                        hold(pipeline, &mut sleeper);
+                    }
+                    assert_eq!(sleeper.step(&NEAR), IDLE);
+                    sleeper.wait();
+                });
+            }
+            notes.pass();
+            let mut called = vec![notes.woken()];
+            for _ in 0..steps {
+                worker.step(&NEAR).expect("no callback fails");
+                called.push(notes.woken());
+            }
+            drop(worker);
+            called.push(notes.woken());
+            notes.pass();
+            called
+        })
+    })
+}
+
+#[test]
+fn whoever_queues_work_calls_those_who_can_do_it() {
+    let (one, all) = ([(false, 1)], [(false, 2)]);
+    let (holder, all_holders) = ([(true, 1)], [(true, 2)]);
+    let nobody = &[][..];
+    // It interacts and queues one of two updates, which the sleepers can do; then it updates twice,
+    // and only holders can do what is rendered and what it leaves behind.
+    assert_eq!(called(false, false, 1, 3), [nobody, &one, nobody, nobody, nobody]);
+    assert_eq!(called(true, false, 1, 3), [nobody, &holder, &holder, &holder, &holder]);
+    // Leaving after the interaction, it queues the other update too, and passes its call on.
+    assert_eq!(called(false, false, 1, 1), [nobody, &one, &all]);
+    // A holder carries its renderings. All see that the pipeline is at rest, or, if another frame
+    // follows, all holders that there may be more to render.
+    assert_eq!(called(false, true, 1, 5), [nobody, &one, nobody, nobody, nobody, &all, nobody]);
+    // Interaction, update, rendering, entry, update, rendering: each update lets a unit enter.
+    let steps = called(true, true, 2, 6);
+    assert_eq!(steps[..7], [nobody, &holder, &holder, nobody, nobody, &holder, &all_holders]);
 }
 
 #[test]
