@@ -18,6 +18,7 @@ use dualframe_core::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
 use dualframe_core::unit::{InteractionId, UnitId, Work};
 use dualframe_core::wait::{Bell, Epoch, Waiting};
 use dualframe_core::worker::{Step, Worker};
+use dualframe_tests::watchdog;
 
 /// Every two units meet, or none do. Interactions push two records.
 struct Crowd {
@@ -330,6 +331,21 @@ fn a_holder_renders_what_waits_first_and_carries_its_own() {
 }
 
 #[test]
+fn a_token_goes_from_hand_to_hand() {
+    with(1, 1, 1, |mut pipeline, _| {
+        pipeline.run(1).expect("at rest");
+        let (mut a, mut b) = (pipeline.worker(), pipeline.worker());
+        hold(&pipeline, &mut a);
+        assert_eq!([a.step(&FAR), a.step(&FAR)], [ENTERED, UPDATED]);
+        assert!(a.token().is_some() && b.token().is_none());
+        let token = a.release().expect("it has one");
+        assert!(a.token().is_none() && b.hold(token).is_ok());
+        assert_eq!(a.step(&FAR), IDLE);
+        assert_eq!(b.step(&FAR), RENDERED, "what the other one carried");
+    });
+}
+
+#[test]
 fn nobody_wakes_without_cause() {
     with(1, 1, 1, |mut pipeline, notes| {
         let worker = pipeline.worker();
@@ -366,6 +382,7 @@ fn nobody_wakes_without_cause() {
 /// Who is called by each of so many steps of a worker that carries the interaction of two units, and
 /// then by its leaving, while two others sleep that found nothing to do.
 fn called(they_hold: bool, it_holds: bool, frames: u32, steps: usize) -> Vec<Vec<(bool, u32)>> {
+    let _watch = watchdog::watch(format!("{they_hold} {it_holds} {frames} {steps}"));
     let notes = Notes { night: Some(Barrier::new(3)), ..Notes::default() };
     with_notes(2, 1, 3, &notes, |mut pipeline, notes| {
         pipeline.run(frames).expect("at rest");
