@@ -40,10 +40,10 @@ voxel!(u8, 2);
 voxel!(i16, 4);
 voxel!(u16, 512);
 
-/// Writes a volume to a file, packed by gzip if its name ends in `.gz`; as [`write`].
+/// Writes a volume to a file, packed by gzip if its name ends in `.gz`; as [`write()`].
 ///
 /// # Errors
-/// As [`write`], or the file cannot be created.
+/// As [`write()`], or the file cannot be created.
 pub fn save<V: Voxel>(path: &Path, grid: &Grid, voxels: &[V]) -> Result<(), FileError> {
     let save = || {
         grid.check_length(voxels.len())?;
