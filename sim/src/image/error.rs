@@ -127,8 +127,10 @@ pub enum ImageError {
         spacing: [f64; 3],
     },
     /// The axes are too nearly in one plane.
-    #[error("its axes span {volume} of a cube of their lengths: it must be at least {}",
-        Grid::MIN_VOLUME)]
+    #[error(
+        "its axes span {volume} of a cube of their lengths: it must be at least {}",
+        Grid::MIN_VOLUME
+    )]
     Skewed {
         /// The volume that unit vectors along the axes span; below 0 if they are left-handed.
         volume: f64,

@@ -31,8 +31,7 @@ struct Axis {
     reversed: bool,
 }
 
-const ORDERS: [[usize; 3]; 6] =
-    [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
 impl Grid {
     /// The most voxels along an axis.
@@ -185,9 +184,8 @@ impl Axis {
 /// The axes of the file that are most nearly along the patient's: the order in which the sum of their
 /// cosines is greatest, the first of equals.
 fn nearest(directions: [DVec3; 3]) -> [Axis; 3] {
-    let cosines = |order: [usize; 3]| -> f64 {
-        (0..3).map(|axis| directions[order[axis]][axis].abs()).sum()
-    };
+    let cosines =
+        |order: [usize; 3]| -> f64 { (0..3).map(|axis| directions[order[axis]][axis].abs()).sum() };
     let mut best = ORDERS[0];
     for order in ORDERS {
         if cosines(order) > cosines(best) {

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use glam::DVec3;
 
 use super::header::{Header, MAGIC, MILLIMETRES, SIZEOF_HDR, VOX_OFFSET, at};
 use crate::image::error::{FileError, ImageError};
@@ -39,10 +40,10 @@ voxel!(u8, 2);
 voxel!(i16, 4);
 voxel!(u16, 512);
 
-/// Writes a volume to a file, packed by gzip if its name ends in `.gz`; as [`write`].
+/// Writes a volume to a file, packed by gzip if its name ends in `.gz`; as [`write()`].
 ///
 /// # Errors
-/// As [`write`], or the file cannot be created.
+/// As [`write()`], or the file cannot be created.
 pub fn save<V: Voxel>(path: &Path, grid: &Grid, voxels: &[V]) -> Result<(), FileError> {
     let save = || {
         grid.check_length(voxels.len())?;
@@ -68,11 +69,7 @@ pub fn save<V: Voxel>(path: &Path, grid: &Grid, voxels: &[V]) -> Result<(), File
 ///
 /// # Errors
 /// Another number of values than voxels; the sink's.
-pub fn write<V: Voxel>(
-    sink: &mut impl Write,
-    grid: &Grid,
-    voxels: &[V],
-) -> Result<(), ImageError> {
+pub fn write<V: Voxel>(sink: &mut impl Write, grid: &Grid, voxels: &[V]) -> Result<(), ImageError> {
     grid.check_length(voxels.len())?;
     sink.write_all(&header(grid, V::DATATYPE, V::COUNT))?;
     rows(sink, grid, voxels)?;
@@ -108,15 +105,16 @@ fn header(grid: &Grid, datatype: i16, bytes: usize) -> [u8; VOX_OFFSET as usize]
         put(at::DIM + 2 * number, &length.to_le_bytes());
     }
     let columns = grid.stored_affine().to_cols_array_2d();
-    let millimetres = columns.map(|column| column.map(|metres| metres * MILLIMETRES_PER_METRE));
+    let millimetres =
+        columns.map(|column| column.map(|metres| (metres * MILLIMETRES_PER_METRE) as f32));
     for (axis, column) in millimetres.iter().enumerate() {
         for (row, &length) in column.iter().enumerate() {
-            put(at::SROW_X + 16 * row + 4 * axis, &(length as f32).to_le_bytes());
+            put(at::SROW_X + 16 * row + 4 * axis, &length.to_le_bytes());
         }
     }
     put(at::PIXDIM, &1.0_f32.to_le_bytes());
     for (axis, column) in millimetres[..3].iter().enumerate() {
-        let distance = column.iter().map(|length| length * length).sum::<f64>().sqrt();
+        let distance = DVec3::from(column.map(f64::from)).length();
         put(at::PIXDIM + 4 * (axis + 1), &(distance as f32).to_le_bytes());
     }
     header

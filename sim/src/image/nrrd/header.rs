@@ -53,8 +53,13 @@ fn number(name: &str) -> Result<Number, ImageError> {
         "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => Number::U16,
         "int" | "signed int" | "int32" | "int32_t" => Number::I32,
         "uint" | "unsigned int" | "uint32" | "uint32_t" => Number::U32,
-        "longlong" | "long long" | "long long int" | "signed long long"
-        | "signed long long int" | "int64" | "int64_t" => Number::I64,
+        "longlong"
+        | "long long"
+        | "long long int"
+        | "signed long long"
+        | "signed long long int"
+        | "int64"
+        | "int64_t" => Number::I64,
         "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => {
             Number::U64
         }
@@ -176,7 +181,8 @@ fn metres_per_unit(units: Option<&str>) -> Result<f64, ImageError> {
 fn spacings(text: &str, unit: f64) -> Result<Vec<Option<DVec3>>, ImageError> {
     let mut directions = DVec3::AXES.into_iter();
     let step = |word: &str| {
-        let spacing: f64 = word.parse().map_err(|_| ImageError::field("spacings", text, "numbers"))?;
+        let spacing: f64 =
+            word.parse().map_err(|_| ImageError::field("spacings", text, "numbers"))?;
         if spacing.is_nan() {
             return Ok(None);
         }
@@ -203,8 +209,7 @@ fn vectors(name: &'static str, text: &str) -> Result<Vec<Option<DVec3>>, ImageEr
         let (inner, after) = inner.split_once(')').ok_or_else(wrong)?;
         let numbers: Result<Vec<f64>, _> =
             inner.split(',').map(|number| number.trim().parse()).collect();
-        let numbers: [f64; 3] =
-            numbers.map_err(|_| wrong())?.try_into().map_err(|_| wrong())?;
+        let numbers: [f64; 3] = numbers.map_err(|_| wrong())?.try_into().map_err(|_| wrong())?;
         vectors.push(Some(numbers.into()));
         rest = after.trim_start();
     }
