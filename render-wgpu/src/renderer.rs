@@ -17,6 +17,7 @@ use crate::look::Look;
 use crate::pick::Picker;
 use crate::picture::{Picture, Readback};
 use crate::room::Room;
+use crate::springs::{GpuMassSpring, Integrator};
 use crate::surface::{Layouts, Surfaces};
 use crate::target::{Format, Target, texture};
 
@@ -37,6 +38,7 @@ pub struct Painter {
     surfaces: Surfaces,
     room: Room,
     picker: Picker,
+    integrator: Integrator,
     units: Units,
     format: Format,
     target: Target,
@@ -65,6 +67,7 @@ impl Painter {
             surfaces: Surfaces::new(device, &layouts, format),
             room: Room::new(device, &layouts, format),
             picker: Picker::new(device, &layouts, Globals::SIZE),
+            integrator: Integrator::default(),
             units: Units::new(),
             target: Target::new(device, format, size.0, size.1),
             camera: Camera::around(&look.focus),
@@ -119,14 +122,25 @@ impl Painter {
         self.surfaces.count()
     }
 
-    /// Takes an object of this frame, unless neither it nor its shadow is in the picture.
+    /// Takes an object of this frame, unless neither it nor its shadow is in the picture. The springs of
+    /// a [`GpuMassSpring`] are integrated in any case.
     pub fn add(&mut self, object: &Object) {
-        let Self { gpu, layouts, surfaces, .. } = self;
+        let size = self.size();
+        let Self { gpu, layouts, surfaces, picker, integrator, units, .. } = self;
         let view = self.view.get_or_insert_with(|| {
             surfaces.clear();
             View::new(self.camera, self.look, self.target.aspect())
         });
-        if self.failure.is_some() || !view.may_see(&object.bounds()) {
+        if self.failure.is_some() {
+            return;
+        }
+        if let Some(springs) = GpuMassSpring::of(object)
+            && gpu.failure().is_none()
+        {
+            let context = Context { gpu, view, size, surfaces, picker, integrator };
+            springs.integrate(&context, units);
+        }
+        if !view.may_see(&object.bounds()) {
             return;
         }
         match &object.geometry {
@@ -171,10 +185,11 @@ impl Painter {
         }
         self.surfaces.paint(&mut pass, &self.globals.lit);
         drop(pass);
-        let Self { gpu, surfaces, picker, units, .. } = self;
-        let size = (self.target.width, self.target.height);
-        let context = Context { gpu, view: &view, size, surfaces, picker };
+        let size = self.size();
+        let Self { gpu, surfaces, picker, integrator, units, .. } = self;
+        let context = Context { gpu, view: &view, size, surfaces, picker, integrator };
         units.finish(&context);
+        units.run_now(&context);
         units.encode(&context, encoder);
     }
 }
