@@ -64,6 +64,12 @@ impl std::fmt::Debug for AuxiliaryFull {
 pub struct Auxiliary(SyncSender<Box<dyn GpuUnit>>);
 
 impl Auxiliary {
+    /// A queue that nobody serves: what is submitted is dropped. For environments without a renderer.
+    #[must_use]
+    pub fn unserved() -> Self {
+        Self(sync_channel(0).0)
+    }
+
     /// Submits a unit. If the renderer is gone it is dropped.
     ///
     /// # Errors

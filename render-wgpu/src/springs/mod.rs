@@ -1,6 +1,8 @@
 //! Mass–spring bodies whose springs a graphics device integrates.
 
 mod integrator;
+#[cfg(test)]
+mod tests;
 
 use std::any::Any;
 use std::hash::Hasher;
@@ -22,15 +24,18 @@ use crate::error::GraphicsError;
 /// A frame's update ends where [`MassSpring::begin`] does: contacts and pulls have changed the
 /// velocities, and dashpots, springs and gravity are left. They go to the device as a unit of GPU work,
 /// which is run when the object is rendered, and their outcome is there when the next update begins. So
-/// no update waits for the device; and what is drawn, touched and hashed is the body before the springs
-/// of the frame, one frame's motion behind that of a [`MassSpring`].
+/// no update waits for the device.
 ///
-/// What the device did not integrate, the next update does by the processor, to the very bits of
-/// [`Springs::advance`]: if the object was not drawn, or only a copy of it was (as by
-/// [`RayonOverlappedExecutor`]), if a message changed the body in between, or if the device fails. The
-/// device adds up in another order and may divide less exactly: in 240 frames of free vibration, falling
-/// and contacts a particle's nodes stay within 10 µm of the processor's. Results are the same for any
-/// number of threads as long as the device is the same, its driver too.
+/// Until then the mesh has predicted positions, and those are drawn and touched: where its nodes come
+/// if the springs change their velocities as in the frame before. Contacts with where a body was a frame
+/// ago would act like negative damping, and throw everything about.
+///
+/// What the device did not integrate, the next update does by the processor, as [`Springs::advance`]:
+/// if the object was not drawn, or only a copy of it was (as by [`RayonOverlappedExecutor`]), if somebody
+/// changed the mesh in between, or if the device fails. The device adds up in another order and may
+/// divide less exactly: in 240 frames of vibration, falling and contacts a particle's nodes stay within
+/// 10 µm of the processor's. Results are the same for any number of threads as long as the device is the
+/// same, its driver too.
 ///
 /// One workgroup of 256 invocations integrates a body, whatever its size; different bodies at once.
 ///
@@ -40,6 +45,12 @@ pub struct GpuMassSpring {
     auxiliary: Auxiliary,
     /// What the last update left to be done.
     left: Option<Springs>,
+    /// What the mesh had after the last update: positions as predicted, velocities, masses, by
+    /// components.
+    predicted: Vec<f32>,
+    /// By how much the springs changed the velocities in the frame before, by components.
+    gained: Vec<f32>,
+    frames_by_device: u64,
     slot: Arc<Mutex<Slot>>,
 }
 
@@ -49,7 +60,21 @@ impl GpuMassSpring {
     /// [`Painter::auxiliary`]: crate::renderer::Painter::auxiliary
     #[must_use]
     pub fn new(springs: MassSpring, auxiliary: Auxiliary) -> Self {
-        Self { own: springs, auxiliary, left: None, slot: Arc::default() }
+        Self {
+            own: springs,
+            auxiliary,
+            left: None,
+            predicted: Vec::new(),
+            gained: Vec::new(),
+            frames_by_device: 0,
+            slot: Arc::default(),
+        }
+    }
+
+    /// The number of frames so far whose springs the device integrated.
+    #[must_use]
+    pub fn frames_by_device(&self) -> u64 {
+        self.frames_by_device
     }
 
     /// The behaviour of an object, if it is one of these.
@@ -70,6 +95,44 @@ impl GpuMassSpring {
         }
     }
 
+    /// Makes the mesh what the springs of the last frame made of it.
+    fn end_frame(&mut self, mesh: &mut Mesh, input: &mut Input<'_>) {
+        let mut slot = lock(&self.slot);
+        let Some(springs) = self.left.take().filter(|_| slot.is_of(mesh)) else {
+            self.gained.clear();
+            self.gained.resize(3 * mesh.velocities.len(), 0.0);
+            return;
+        };
+        let is_changed = slot.restore(mesh, &self.predicted);
+        self.gained.clear();
+        mesh.velocities.as_slices().iter().for_each(|list| self.gained.extend_from_slice(list));
+        if !is_changed && slot.take(mesh) {
+            self.frames_by_device += 1;
+        } else {
+            drop(slot);
+            springs.advance(mesh, input);
+        }
+        let after = mesh.velocities.as_slices().into_iter().flatten();
+        for (gained, after) in self.gained.iter_mut().zip(after) {
+            *gained = after - *gained;
+        }
+    }
+
+    /// Moves the nodes to where they will probably be in `time` seconds.
+    fn predict(&mut self, mesh: &mut Mesh, time: f32) {
+        let [x, y, z, u, v, w] = components(mesh);
+        let mut gained = self.gained.iter();
+        for (positions, velocities) in [(x, u), (y, v), (z, w)] {
+            for ((position, velocity), gained) in
+                positions.iter_mut().zip(velocities).zip(&mut gained)
+            {
+                *position += (*velocity + gained) * time;
+            }
+        }
+        self.predicted.clear();
+        numbers(mesh).for_each(|list| self.predicted.extend_from_slice(list));
+    }
+
     fn submit(&self) {
         let turn = lock(&self.slot).turn;
         // From a full queue the unit comes back; who renders the object submits another.
@@ -80,14 +143,11 @@ impl GpuMassSpring {
 impl Behavior for GpuMassSpring {
     fn update(&mut self, geometry: &mut Geometry, input: &mut Input<'_>) {
         let Some(mesh) = geometry.as_mesh_mut() else { return };
-        if let Some(springs) = self.left.take()
-            && !lock(&self.slot).take(mesh)
-        {
-            springs.advance(mesh, input);
-        }
+        self.end_frame(mesh, input);
         let springs = self.own.begin(mesh, input);
         self.left = Some(springs);
         lock(&self.slot).put(mesh, springs);
+        self.predict(mesh, springs.time);
         self.submit();
     }
 
@@ -98,13 +158,11 @@ impl Behavior for GpuMassSpring {
     fn hash_state(&self, hasher: &mut dyn Hasher) {
         self.own.hash_state(hasher);
         let Some(left) = self.left else { return };
-        for value in [left.damping, left.stiffness, left.center_stiffness, left.time]
-            .into_iter()
-            .chain(left.gravity)
-        {
-            hasher.write(&value.to_le_bytes());
-        }
-        hasher.write(&left.substeps.to_le_bytes());
+        let Springs { damping, stiffness, center_stiffness, gravity, time, substeps } = left;
+        hasher.write(&substeps.to_le_bytes());
+        let slot = lock(&self.slot);
+        let own = [damping, stiffness, center_stiffness, time].into_iter().chain(gravity);
+        own.chain(slot.nodes.iter().copied()).for_each(|value| hasher.write(&value.to_le_bytes()));
     }
 }
 
@@ -137,6 +195,7 @@ enum Progress {
     /// Integrated, and the object was rendered after its update: not before then does the outcome
     /// count, so that it never depends on who was faster whether it does.
     HandedOver,
+    Taken,
 }
 
 impl Slot {
@@ -149,29 +208,47 @@ impl Slot {
         numbers(mesh).for_each(|list| self.nodes.extend_from_slice(list));
     }
 
-    /// Gives the body what became of it, if that was handed over and nobody changed the body meanwhile.
+    /// Whether what was put last is this body.
+    fn is_of(&self, mesh: &Mesh) -> bool {
+        let masses = mesh.masses();
+        self.nodes.len() == 7 * masses.len()
+            && self.nodes.ends_with(masses)
+            && [&mesh.positions, &mesh.velocities].iter().all(|list| list.len() == masses.len())
+            && self.task.as_ref().is_some_and(|task| Arc::ptr_eq(&task.topology, mesh.topology()))
+    }
+
+    /// Gives the body the state that was put here instead of the one `predicted` from it. If somebody
+    /// changed that, it is changed by as much, and the return value is `true`.
+    fn restore(&self, mesh: &mut Mesh, predicted: &[f32]) -> bool {
+        let mut is_changed = false;
+        let now = components(mesh).into_iter().flatten();
+        for ((now, put), predicted) in now.zip(&self.nodes).zip(predicted) {
+            let change = *now - predicted;
+            is_changed |= change != 0.0;
+            *now = put + change;
+        }
+        is_changed
+    }
+
+    /// Notes what became of the body that was put here in a turn.
+    fn receive(&mut self, turn: u64, bytes: &[u8]) {
+        let (numbers, _) = bytes.as_chunks();
+        let is_awaited = turn == self.turn && self.progress == Progress::Waiting;
+        if is_awaited && 7 * numbers.len() == 6 * self.nodes.len() {
+            self.integrated.clear();
+            self.integrated.extend(numbers.iter().map(|&number| f32::from_ne_bytes(number)));
+            self.progress = Progress::Integrated;
+        }
+    }
+
+    /// Gives the body what became of it, if that was handed over and not taken yet.
     fn take(&mut self, mesh: &mut Mesh) -> bool {
-        let Some(task) = self.task.take() else { return false };
-        if self.progress != Progress::HandedOver || !Arc::ptr_eq(&task.topology, mesh.topology()) {
+        if self.progress != Progress::HandedOver {
             return false;
         }
-        let mut rest = self.nodes.as_slice();
-        let unchanged = numbers(mesh).all(|list| {
-            let Some((then, others)) = rest.split_at_checked(list.len()) else { return false };
-            rest = others;
-            then == list
-        });
-        if !unchanged {
-            return false;
-        }
-        let mut integrated = self.integrated.as_slice();
-        for vectors in [&mut mesh.positions, &mut mesh.velocities] {
-            for component in vectors.as_mut_slices() {
-                let (own, others) = integrated.split_at(component.len());
-                component.copy_from_slice(own);
-                integrated = others;
-            }
-        }
+        self.progress = Progress::Taken;
+        let now = components(mesh).into_iter().flatten();
+        now.zip(&self.integrated).for_each(|(now, integrated)| *now = *integrated);
         true
     }
 
@@ -182,6 +259,13 @@ impl Slot {
         }
         self.progress == Progress::HandedOver
     }
+}
+
+/// Positions and velocities, by components.
+fn components(mesh: &mut Mesh) -> [&mut [f32]; 6] {
+    let Mesh { positions, velocities, .. } = mesh;
+    let ([x, y, z], [u, v, w]) = (positions.as_mut_slices(), velocities.as_mut_slices());
+    [x, y, z, u, v, w]
 }
 
 /// Positions, velocities and masses, by components.
@@ -211,13 +295,9 @@ impl GpuUnit for Unit {
     }
 
     fn finish(self: Box<Self>, _context: &Context<'_>, results: Result<&[u8], GraphicsError>) {
-        let mut slot = lock(&self.slot);
         // Without results the processor integrates.
-        let Ok(bytes) = results else { return };
-        if slot.turn == self.turn {
-            slot.integrated.clear();
-            slot.integrated.extend(bytemuck::cast_slice::<u8, f32>(bytes));
-            slot.progress = Progress::Integrated;
+        if let Ok(bytes) = results {
+            lock(&self.slot).receive(self.turn, bytes);
         }
     }
 }
