@@ -101,17 +101,18 @@ impl Encoded {
     }
 
     fn finish(self, context: &Context<'_>) {
-        let failed = || {
+        // A buffer can be read even if what was to write it was refused.
+        if let Some(failure) = context.gpu.failure() {
+            return self.unit.finish(context, Err(failure));
+        }
+        let is_mapped = self.state.load(Ordering::Acquire) == MAPPED;
+        let Some(bytes) = is_mapped.then(|| self.results.get_mapped_range(..).ok()).flatten()
+        else {
             let reason = "its results cannot be read".to_owned();
-            context.gpu.failure().unwrap_or(GraphicsError::Lost { reason })
+            return self.unit.finish(context, Err(GraphicsError::Lost { reason }));
         };
-        if self.state.load(Ordering::Acquire) == FAILED {
-            return self.unit.finish(context, Err(failed()));
-        }
-        match self.results.get_mapped_range(..) {
-            Ok(bytes) => self.unit.finish(context, Ok(&bytes)),
-            Err(_) => return self.unit.finish(context, Err(failed())),
-        }
+        self.unit.finish(context, Ok(&bytes));
+        drop(bytes);
         // Its unit's owner may use the buffer again.
         self.results.unmap();
     }

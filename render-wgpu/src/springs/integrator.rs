@@ -100,7 +100,8 @@ impl Integrator {
         let steps = task.springs.substeps + u32::from(task.springs.damping > 0.0);
         // Every step but the first reads what the last one wrote.
         let written = if steps % 2 == 0 { 0 } else { bytes(SENT * count) };
-        encoder.copy_buffer_to_buffer(&body.state, written, &body.results, 0, None);
+        let size = body.results.size();
+        encoder.copy_buffer_to_buffer(&body.state, written, &body.results, 0, size);
         Some(body.results.clone())
     }
 
