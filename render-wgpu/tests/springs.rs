@@ -290,8 +290,8 @@ fn momentum_is_kept() {
 #[ignore = "needs a graphics adapter; .ci/run has one"]
 fn a_mixed_environment_has_the_same_bits_for_any_number_of_threads() {
     // More units than the queue holds at once.
-    const OBJECTS: usize = 330;
-    const FRAMES: u64 = 12;
+    const OBJECTS: usize = 300;
+    const FRAMES: u64 = 6;
     let settings = ParticleScene { gravity: true, ..ParticleScene::new(OBJECTS) };
     let mut hashes = Vec::new();
     for (executor, threads) in [

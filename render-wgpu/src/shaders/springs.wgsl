@@ -31,7 +31,8 @@ const LEAST_SQUARE: f32 = 1e-30;
 // Where the neighbours of each node begin, and after all where they end; then for each neighbour its
 // number and the spring's length at rest; then each node's distance to the centre at rest.
 @group(0) @binding(0) var<storage, read> table: array<u32>;
-@group(0) @binding(1) var<uniform> numbers: Numbers;
+// Not a uniform: for those Mesa's software adapter compiles the loops anew in every dispatch.
+@group(0) @binding(1) var<storage, read> numbers: Numbers;
 // Positions, velocities, masses; then positions and velocities once more: what one step writes, the
 // next one reads. Components x, y and z lie one after the other.
 @group(0) @binding(2) var<storage, read_write> state: array<f32>;
@@ -59,15 +60,17 @@ fn pull(dashpots: bool, way: vec3f, relative: vec3f, stiffness: f32, rest: f32) 
     return stiffness * (1.0 - rest / sqrt(square));
 }
 
-// The sum of what the lanes have.
+// The sum of what the lanes have, for those that have a node.
 fn total(own: vec3f, lane: u32) -> vec3f {
     // Somebody may still be reading the last one.
     workgroupBarrier();
     partial[lane] = own;
     workgroupBarrier();
     var sum = vec3f(0.0);
-    for (var other = 0u; other < min(LANES, numbers.nodes); other += 1u) {
-        sum += partial[other];
+    if lane < numbers.nodes {
+        for (var other = 0u; other < min(LANES, numbers.nodes); other += 1u) {
+            sum += partial[other];
+        }
     }
     return sum;
 }

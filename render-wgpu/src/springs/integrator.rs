@@ -191,7 +191,7 @@ impl Body {
             })
         };
         let numbers =
-            buffer(size_of::<Numbers>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
+            buffer(size_of::<Numbers>() as u64, BufferUsages::STORAGE | BufferUsages::COPY_DST);
         let both = BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let state = buffer(bytes((SENT + RETURNED) * nodes), BufferUsages::STORAGE | both);
         let results = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
