@@ -99,7 +99,7 @@ impl Integrator {
         drop(pass);
         let steps = task.springs.substeps + u32::from(task.springs.damping > 0.0);
         // Every step but the first reads what the last one wrote.
-        let written = if steps % 2 == 0 { 0 } else { bytes(SENT * count) };
+        let written = if steps.is_multiple_of(2) { 0 } else { bytes(SENT * count) };
         let size = body.results.size();
         encoder.copy_buffer_to_buffer(&body.state, written, &body.results, 0, size);
         Some(body.results.clone())
