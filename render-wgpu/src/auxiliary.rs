@@ -14,6 +14,7 @@ use crate::error::GraphicsError;
 use crate::globals::View;
 use crate::gpu::Gpu;
 use crate::pick::Picker;
+use crate::springs::Integrator;
 use crate::surface::Surfaces;
 
 /// Units that may wait at once; usually 256.
@@ -27,8 +28,9 @@ pub trait GpuUnit: Send {
         false
     }
 
-    /// Encodes what it does, its results into a buffer that can be mapped for reading.
-    fn encode(&mut self, context: &Context<'_>, encoder: &mut CommandEncoder) -> Buffer;
+    /// Encodes what it does, its results into a buffer that can be mapped for reading. `None` if there
+    /// is nothing to do any more, or it cannot be done; that is then the end of the unit.
+    fn encode(&mut self, context: &Context<'_>, encoder: &mut CommandEncoder) -> Option<Buffer>;
 
     /// Told, on the token holder's thread, what is in that buffer once the device is done, or why it
     /// never will be.
@@ -43,6 +45,7 @@ pub struct Context<'a> {
     pub(crate) size: (u32, u32),
     pub(crate) surfaces: &'a Surfaces,
     pub(crate) picker: &'a Picker,
+    pub(crate) integrator: &'a Integrator,
 }
 
 /// The queue is full, and the unit came back.
@@ -61,6 +64,12 @@ impl std::fmt::Debug for AuxiliaryFull {
 pub struct Auxiliary(SyncSender<Box<dyn GpuUnit>>);
 
 impl Auxiliary {
+    /// A queue that nobody serves: what is submitted is dropped. For environments without a renderer.
+    #[must_use]
+    pub fn unserved() -> Self {
+        Self(sync_channel(0).0)
+    }
+
     /// Submits a unit. If the renderer is gone it is dropped.
     ///
     /// # Errors
@@ -92,17 +101,20 @@ impl Encoded {
     }
 
     fn finish(self, context: &Context<'_>) {
-        let failed = || {
+        // A buffer can be read even if what was to write it was refused.
+        if let Some(failure) = context.gpu.failure() {
+            return self.unit.finish(context, Err(failure));
+        }
+        let is_mapped = self.state.load(Ordering::Acquire) == MAPPED;
+        let Some(bytes) = is_mapped.then(|| self.results.get_mapped_range(..).ok()).flatten()
+        else {
             let reason = "its results cannot be read".to_owned();
-            context.gpu.failure().unwrap_or(GraphicsError::Lost { reason })
+            return self.unit.finish(context, Err(GraphicsError::Lost { reason }));
         };
-        if self.state.load(Ordering::Acquire) == FAILED {
-            return self.unit.finish(context, Err(failed()));
-        }
-        match self.results.get_mapped_range(..) {
-            Ok(bytes) => self.unit.finish(context, Ok(&bytes)),
-            Err(_) => self.unit.finish(context, Err(failed())),
-        }
+        self.unit.finish(context, Ok(&bytes));
+        drop(bytes);
+        // Its unit's owner may use the buffer again.
+        self.results.unmap();
     }
 }
 
@@ -112,6 +124,7 @@ pub(crate) struct Units {
     receiver: Receiver<Box<dyn GpuUnit>>,
     /// Those that wait for a frame.
     for_frame: Vec<Box<dyn GpuUnit>>,
+    /// Those encoded with a frame that the device is not known to be done with.
     encoded: Vec<Encoded>,
 }
 
@@ -125,12 +138,12 @@ impl Units {
         Auxiliary(self.sender.clone())
     }
 
-    /// Encodes what waits after a frame was drawn.
+    /// Encodes what waits for a frame, after one was drawn. What needs none was [run] before.
+    ///
+    /// [run]: Units::run_now
     pub(crate) fn encode(&mut self, context: &Context<'_>, encoder: &mut CommandEncoder) {
-        self.for_frame.extend(self.receiver.try_iter());
-        for unit in self.for_frame.drain(..) {
-            self.encoded.push(encode(unit, context, encoder));
-        }
+        let units = self.for_frame.drain(..);
+        self.encoded.extend(units.filter_map(|unit| encode(unit, context, encoder)));
     }
 
     /// Finishes what the device is done with, without waiting.
@@ -161,7 +174,7 @@ impl Units {
         let Gpu { device, queue, .. } = context.gpu;
         let mut encoder = device.create_command_encoder(&Default::default());
         let encode = |unit| encode(unit, context, &mut encoder);
-        let encoded: Vec<_> = now.into_iter().map(encode).collect();
+        let encoded: Vec<_> = now.into_iter().filter_map(encode).collect();
         queue.submit([encoder.finish()]);
         // A failure is noted by the device's own callbacks.
         let _ = device.poll(PollType::wait_indefinitely());
@@ -175,8 +188,8 @@ fn encode(
     mut unit: Box<dyn GpuUnit>,
     context: &Context<'_>,
     encoder: &mut CommandEncoder,
-) -> Encoded {
-    let results = unit.encode(context, encoder);
+) -> Option<Encoded> {
+    let results = unit.encode(context, encoder)?;
     let state = Arc::new(AtomicU8::new(MAPPING));
     let told = Arc::clone(&state);
     encoder.map_buffer_on_submit(&results, MapMode::Read, .., move |mapped| {
@@ -184,5 +197,5 @@ fn encode(
         // Release: with the Acquire of whoever asks.
         told.store(state, Ordering::Release);
     });
-    Encoded { unit, results, state }
+    Some(Encoded { unit, results, state })
 }

@@ -11,6 +11,7 @@
 //! | [`camera`], [`look`] | from where, and how |
 //! | [`picture`] | finished pictures, PNG |
 //! | [`auxiliary`], [`pick`] | GPU work besides drawing (§9); what is under a pixel |
+//! | [`springs`] | mass–spring bodies whose springs the device integrates |
 //! | [`error`] | what can go wrong |
 //!
 //! The `dualframe` program is in this package too, behind the feature `app`, which is on by default.
@@ -26,6 +27,7 @@ pub mod pick;
 pub mod picture;
 pub mod renderer;
 mod room;
+pub mod springs;
 mod surface;
 mod target;
 mod volume;

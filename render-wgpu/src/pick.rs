@@ -47,8 +47,8 @@ impl GpuUnit for Pick {
         true
     }
 
-    fn encode(&mut self, context: &Context<'_>, encoder: &mut CommandEncoder) -> Buffer {
-        context.picker.encode(context, self.point, encoder)
+    fn encode(&mut self, context: &Context<'_>, encoder: &mut CommandEncoder) -> Option<Buffer> {
+        Some(context.picker.encode(context, self.point, encoder))
     }
 
     fn finish(self: Box<Self>, context: &Context<'_>, results: Result<&[u8], GraphicsError>) {

@@ -17,6 +17,7 @@ use crate::look::Look;
 use crate::pick::Picker;
 use crate::picture::{Picture, read_texture};
 use crate::room::Room;
+use crate::springs::{GpuMassSpring, Integrator};
 use crate::surface::{Layouts, Surfaces};
 use crate::target::{Format, Target, texture};
 use crate::volume::Volumes;
@@ -40,6 +41,7 @@ pub struct Painter {
     volumes: Volumes,
     room: Room,
     picker: Picker,
+    integrator: Integrator,
     units: Units,
     format: Format,
     target: Target,
@@ -70,6 +72,7 @@ impl Painter {
             volumes: Volumes::new(device, &layouts, format, look.quality),
             room: Room::new(device, &layouts, format),
             picker: Picker::new(device, &layouts),
+            integrator: Integrator::default(),
             units: Units::new(),
             target: Target::new(device, format, size.0, size.1),
             camera: Camera::around(&look.focus),
@@ -124,15 +127,26 @@ impl Painter {
         self.surfaces.count() + self.volumes.count()
     }
 
-    /// Takes an object of this frame, unless neither it nor its shadow is in the picture.
+    /// Takes an object of this frame, unless neither it nor its shadow is in the picture. The springs of
+    /// a [`GpuMassSpring`] are integrated in any case.
     pub fn add(&mut self, object: &Object) {
-        let Self { gpu, layouts, surfaces, volumes, .. } = self;
+        let size = self.size();
+        let Self { gpu, layouts, surfaces, volumes, picker, integrator, units, .. } = self;
         let view = self.view.get_or_insert_with(|| {
             surfaces.clear();
             volumes.clear();
             View::new(self.camera, self.look, self.target.aspect())
         });
-        if self.failure.is_some() || !view.may_see(&object.bounds()) {
+        if self.failure.is_some() {
+            return;
+        }
+        if let Some(springs) = GpuMassSpring::of(object)
+            && gpu.failure().is_none()
+        {
+            let context = Context { gpu, view, size, surfaces, picker, integrator };
+            springs.integrate(&context, units);
+        }
+        if !view.may_see(&object.bounds()) {
             return;
         }
         match &object.geometry {
@@ -193,10 +207,11 @@ impl Painter {
         self.surfaces.paint(&mut pass, &self.globals.lit);
         self.volumes.paint(&mut pass, &self.globals.lit);
         drop(pass);
-        let Self { gpu, surfaces, picker, units, .. } = self;
-        let size = (self.target.width, self.target.height);
-        let context = Context { gpu, view: &view, size, surfaces, picker };
+        let size = self.size();
+        let Self { gpu, surfaces, picker, integrator, units, .. } = self;
+        let context = Context { gpu, view: &view, size, surfaces, picker, integrator };
         units.finish(&context);
+        units.run_now(&context);
         units.encode(&context, encoder);
     }
 }

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::pull::Pull;
 use super::spring_kernel::Springs;
-use super::{Behavior, Input, batch};
+use super::{Behavior, Input};
 use crate::geometry::{Geometry, Mesh, Spring};
 use crate::interaction::Contact;
 use crate::message::Message;
@@ -119,7 +119,8 @@ fn check(what: &'static str, value: f32) -> Result<(), MassSpringError> {
 
 impl MassSpring {
     /// Begins an update: what the frame's contacts do, and whoever pulls. What is left are the springs.
-    pub(super) fn begin(&self, mesh: &mut Mesh, input: &Input<'_>) -> Springs {
+    #[must_use]
+    pub fn begin(&self, mesh: &mut Mesh, input: &Input<'_>) -> Springs {
         for contact in input.contacts() {
             let impulse = Vec3::from_array(contact.impulse);
             match contact.node {
@@ -144,8 +145,7 @@ impl MassSpring {
 impl Behavior for MassSpring {
     fn update(&mut self, geometry: &mut Geometry, input: &mut Input<'_>) {
         let Some(mesh) = geometry.as_mesh_mut() else { return };
-        let springs = self.begin(mesh, input);
-        batch::advance_alone(mesh, springs, input.workspace, input.simd);
+        self.begin(mesh, input).advance(mesh, input);
     }
 
     fn process(&mut self, message: &Message) {

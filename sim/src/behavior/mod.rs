@@ -24,6 +24,7 @@ use crate::simd::Simd;
 pub use fixed::Fixed;
 pub use mass_spring::{MassSpring, MassSpringError};
 pub use scripted::{Keyframe, ScriptError, Scripted};
+pub use spring_kernel::Springs;
 
 /// How an object changes from frame to frame.
 pub trait Behavior: Any + Send + Sync {

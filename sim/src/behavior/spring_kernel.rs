@@ -16,30 +16,43 @@
 //! [`fold`]: crate::simd::fold
 
 use super::spring_law::{Dashpot, Elastic, Law, load, minus, plus, splat, store, times};
-use crate::geometry::{KernelParts, LANES, Lanes, Slot};
+use super::{Input, batch};
+use crate::geometry::{KernelParts, LANES, Lanes, Mesh, Slot};
 use crate::simd::{Isa, Kernel, Lanes3, Quad};
 
-/// What one frame of a mass–spring body is computed from, besides its mesh.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Springs {
-    /// c of all dashpots, in newton seconds per metre.
-    pub(crate) damping: f32,
+/// What one frame of a mass–spring body is computed from, besides its mesh: what [`MassSpring::begin`]
+/// leaves to be done.
+///
+/// [`MassSpring::begin`]: super::MassSpring::begin
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Springs {
+    /// c of all dashpots, in newton seconds per metre. They act first, over the whole frame.
+    pub damping: f32,
     /// k of the springs between nodes, in newtons per metre.
-    pub(crate) stiffness: f32,
+    pub stiffness: f32,
     /// k of the springs to the centre, in newtons per metre.
-    pub(crate) center_stiffness: f32,
+    pub center_stiffness: f32,
     /// In metres per second squared.
-    pub(crate) gravity: [f32; 3],
+    pub gravity: [f32; 3],
     /// The frame's time, in seconds.
-    pub(crate) time: f32,
-    /// Steps in which springs and gravity act.
-    pub(crate) substeps: u32,
+    pub time: f32,
+    /// Equal steps in which springs and gravity act, at least 1.
+    pub substeps: u32,
 }
 
 impl Springs {
     /// The time of a substep, in seconds.
-    pub(super) fn step_time(&self) -> f32 {
+    #[must_use]
+    pub fn step_time(&self) -> f32 {
         self.time / self.substeps as f32
+    }
+
+    /// Advances positions and velocities by the frame.
+    ///
+    /// # Panics
+    /// The mesh has fewer positions or velocities than its topology has nodes.
+    pub fn advance(self, mesh: &mut Mesh, input: &mut Input<'_>) {
+        batch::advance_alone(mesh, self, input.workspace, input.simd);
     }
 }
 

@@ -79,6 +79,12 @@ impl Vectors {
         self.components.each_ref().map(|component| &component.as_flattened()[..self.len])
     }
 
+    /// As [`Vectors::as_slices`], to be replaced.
+    pub fn as_mut_slices(&mut self) -> [&mut [f32]; 3] {
+        let len = self.len;
+        self.components.each_mut().map(|component| &mut component.as_flattened_mut()[..len])
+    }
+
     /// All vectors in order.
     pub fn iter(&self) -> impl Iterator<Item = Vec3> + '_ {
         let [x, y, z] = self.as_slices();
