@@ -343,3 +343,26 @@ fn numbers_and_rules_change_between_runs() {
         }
     }
 }
+
+#[test]
+fn rules_that_come_later_count() {
+    let scene = || {
+        let mut scene = particles(20, true, true);
+        scene.stages.rules = Rules::new();
+        scene
+    };
+    let hash = |executor: &mut dyn Executor| {
+        run(executor, 3);
+        let mut rules = particles(20, true, true).stages.rules;
+        executor.change(&mut |stages| std::mem::swap(&mut stages.rules, &mut rules));
+        let (counts, hash, _) = run(executor, 20);
+        assert!(counts.iter().any(|count| count.candidates > 0), "nothing interacts");
+        hash
+    };
+    let expected = hash(&mut serial(scene()));
+    for grain in GRAINS {
+        for (name, mut executor) in executors(scene, grain, 2) {
+            assert_eq!(hash(&mut *executor), expected, "{name}, {grain:?}");
+        }
+    }
+}
