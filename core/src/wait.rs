@@ -147,7 +147,8 @@ impl Bells {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
-    use std::{sync::Mutex, vec, vec::Vec};
+    use std::sync::Mutex;
+    use std::{vec, vec::Vec};
 
     /// Notes on which bell somebody is to sleep, and how many are to be woken. The holders' bell is `true`.
     #[derive(Default)]

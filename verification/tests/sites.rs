@@ -9,14 +9,16 @@ fn core() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../core")
 }
 
-/// The core's files by name, without comments.
+/// The core's files by name, without comments and tests.
 fn sources() -> Vec<(String, String)> {
     let files = fs::read_dir(core().join("src")).expect("the core's source");
     let read = |entry: std::io::Result<fs::DirEntry>| {
         let path = entry.expect("an entry").path();
         assert_eq!(path.extension().and_then(|ending| ending.to_str()), Some("rs"), "{path:?}");
         let text = fs::read_to_string(&path).expect("text");
-        let code = text.lines().map(|line| line.split("//").next().unwrap_or_default());
+        let shipped =
+            text.split("#[cfg(all(test, not(loom)))]\nmod tests").next().unwrap_or_default();
+        let code = shipped.lines().map(|line| line.split("//").next().unwrap_or_default());
         let name = path.file_name().expect("a name").to_string_lossy().into_owned();
         (name, code.collect::<Vec<_>>().join("\n"))
     };
