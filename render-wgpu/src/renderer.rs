@@ -137,6 +137,11 @@ impl Painter {
         }
     }
 
+    /// Ends the frame without a picture.
+    pub fn discard(&mut self) {
+        self.view = None;
+    }
+
     /// Ends the frame: encodes how `picture`, a view of a texture of this size and format, is made of
     /// what was taken. Does nothing once the device has failed.
     pub fn paint(&mut self, encoder: &mut CommandEncoder, picture: &TextureView) {

@@ -25,16 +25,19 @@ pub enum Message {
         to_center: f32,
     },
     /// Sets the damping of a mass–spring body's springs, in newton seconds per metre; negative or
-    /// non-finite values are ignored. Usually 0 to 0.1 for a particle.
+    /// non-finite values are ignored. Usually 0.02 for a particle; [`MassSpring`] says how much is
+    /// stable.
+    ///
+    /// [`MassSpring`]: crate::behavior::MassSpring
     Damping(f32),
     /// Pulls a mass–spring body by a damped spring from one node to a point fixed in space, in every
     /// update from this one on until it is released or pulled otherwise: a person holds it.
     ///
     /// A resting body's node is off its target by about the force on the body over the stiffness: by its
-    /// weight's, say. The damping is critical for the whole body's mass on the spring. Any stiffness is stable, for one of
-    /// more than m/(2t²) acts like that, with the node's mass m and the frame's time t: 288 N/m for a
-    /// particle at 240 frames a second. Negative or non-finite values are ignored, and nodes that do
-    /// not exist or are held fast are not pulled.
+    /// weight's, say. The damping is critical for the whole body's mass on the spring. Any stiffness is
+    /// stable, for one of more than m/(2t²) acts like that, with the node's mass m and the frame's time
+    /// t: 288 N/m for a particle at 240 frames a second. Negative or non-finite values are ignored, and
+    /// nodes that do not exist or are held fast are not pulled.
     Pull {
         /// The node.
         node: u32,

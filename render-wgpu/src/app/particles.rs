@@ -18,7 +18,7 @@ use super::AllocationCounter;
 use super::args::Particles;
 use super::measure::Measure;
 use super::outputs::{self, Outputs};
-use super::pictures::Pictures;
+use super::pictures::{self, Pictures};
 use super::report::{FrameMilliseconds, Report};
 use super::window::Session;
 
@@ -81,7 +81,11 @@ pub(super) fn run(
         Some(window) => {
             let mut measure = Measure::new(args.frames, count);
             measure.start();
-            let manager = window.run(manager, args.frames, &mut |record| measure.frame(record))?;
+            let on_frame = &mut |record: &FrameRecord| measure.frame(record);
+            let (manager, look, camera) = window.run(manager, args.frames, on_frame)?;
+            if let Some(file) = &outputs.picture {
+                pictures::save(args, &manager, look, camera, file)?;
+            }
             report(args, &manager, &measure, None)
         }
         None => run_unwatched(args, outputs, manager, settings, count)?,

@@ -8,6 +8,7 @@ mod controls;
 mod hand;
 mod input;
 mod overlay;
+mod pace;
 mod paint;
 mod stats;
 mod surface;
@@ -17,7 +18,9 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
+use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::error::GraphicsError;
+use dualframe_render_wgpu::look::Look;
 use dualframe_sim::executor::{ExecutorError, ExecutorKind, FrameRecord};
 use dualframe_sim::manager::VeManager;
 use dualframe_sim::message::Message;
@@ -73,7 +76,7 @@ impl<'a> Session<'a> {
     }
 
     /// Runs the environment until the window is closed, or so many frames are done; gives back the
-    /// environment as it is then.
+    /// environment as it is then, and how it was looked at.
     ///
     /// # Errors
     /// The executor cannot go on, or the window can no longer be drawn to.
@@ -82,7 +85,7 @@ impl<'a> Session<'a> {
         mut manager: VeManager,
         frames: Option<u64>,
         on_frame: &mut dyn FnMut(&FrameRecord),
-    ) -> Result<VeManager, RunError> {
+    ) -> Result<(VeManager, Look, Camera), RunError> {
         self.view.turn_to(self.view.painter.look.focus, manager.mailbox());
         let mut left = frames.unwrap_or(u64::MAX);
         while left > 0 && !self.view.is_closing() {
@@ -100,7 +103,10 @@ impl<'a> Session<'a> {
             self.advance(&mut manager, count, on_frame)?;
             left -= count;
         }
-        self.view.failure().map_or(Ok(manager), |failure| Err(failure.into()))
+        match self.view.failure() {
+            Some(failure) => Err(failure.into()),
+            None => Ok((manager, self.view.painter.look, self.view.painter.camera)),
+        }
     }
 
     fn frames_of_a_run(&self) -> u64 {

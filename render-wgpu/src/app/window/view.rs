@@ -25,14 +25,10 @@ use super::controls::Controls;
 use super::hand::Hand;
 use super::input::{Gesture, Input};
 use super::overlay::Overlay;
+use super::pace::Pace;
 use super::paint::OverlayPainter;
 use super::stats::Stats;
 use super::surface::{self, Screen};
-
-/// Pictures per second where the display does not say how many it shows.
-const USUAL_REFRESH: f64 = 60.0;
-/// How far simulated time may be behind the clock before it is no longer made up for.
-const MOST_LATE: Duration = Duration::from_millis(100);
 
 /// The window as a renderer.
 pub(super) struct View {
@@ -52,12 +48,7 @@ pub(super) struct View {
     pub(super) mailbox: Mailbox,
     /// Whether the frame being drawn is shown. Displays show fewer frames than are computed.
     is_shown: bool,
-    next_shown: Instant,
-    between_shown: Duration,
-    /// When the next frame is due, in real time.
-    due: Instant,
-    /// The time from one frame to the next.
-    time_step: Duration,
+    pace: Pace,
     failure: Option<GraphicsError>,
 }
 
@@ -100,8 +91,7 @@ impl View {
         let painter = Painter::new(gpu, look, screen.format(), screen.size())?;
         let refresh =
             window.current_monitor().and_then(|monitor| monitor.refresh_rate_millihertz());
-        let refresh = refresh.map_or(USUAL_REFRESH, |rate| f64::from(rate.max(1_000)) * 1e-3);
-        let now = Instant::now();
+        let refresh = refresh.map(|rate| f64::from(rate.max(1_000)) * 1e-3);
         Ok(Self {
             event_loop,
             input,
@@ -118,10 +108,7 @@ impl View {
             timeline: shown.timeline,
             mailbox: Mailbox::new(),
             is_shown: true,
-            next_shown: now,
-            between_shown: Duration::from_secs_f64(1.0 / refresh),
-            due: now,
-            time_step: shown.time_step,
+            pace: Pace::new(refresh, shown.time_step),
             failure: None,
         })
     }
@@ -201,24 +188,27 @@ impl View {
         width as f32 / height as f32
     }
 
-    /// The next frame is shown, however soon after the last.
+    /// The objects that come next are shown.
     pub(super) fn show_next(&mut self) {
         self.is_shown = true;
-        self.next_shown = Instant::now();
     }
 
     /// Time stood still: what was missed is not made up for.
     pub(super) fn interrupt(&mut self) {
-        self.due = Instant::now();
+        self.pace.interrupt();
         self.stats.borrow_mut().interrupt();
     }
 
     /// Draws what was taken, and the overlay, and presents both.
     fn present(&mut self) -> Result<(), GraphicsError> {
-        if !self.screen.is_visible() {
-            return Ok(());
-        }
-        let Some(texture) = self.screen.next(self.painter.gpu(), &self.instance)? else {
+        let begun = Instant::now();
+        let gpu = self.painter.gpu();
+        let texture = match self.screen.is_visible() {
+            true => self.screen.next(gpu, &self.instance)?,
+            false => None,
+        };
+        let Some(texture) = texture else {
+            self.painter.discard();
             return Ok(());
         };
         let picture = texture.texture.create_view(&Default::default());
@@ -238,24 +228,14 @@ impl View {
         gpu.queue.submit(commands);
         self.window.pre_present_notify();
         gpu.queue.present(texture);
+        self.pace.shown(gpu, begun);
         Ok(())
     }
 
-    /// Draws what was taken between two runs.
+    /// Draws what was taken.
     pub(super) fn redraw(&mut self) {
         if let Err(error) = self.present() {
             self.failure = Some(error);
-        }
-    }
-
-    /// Waits until the next frame is due, if it is to be as fast as the real world.
-    fn keep_pace(&mut self) {
-        let now = Instant::now();
-        self.due += self.time_step;
-        if !self.controls.is_real_time || now > self.due + MOST_LATE {
-            self.due = now;
-        } else if self.due > now {
-            std::thread::sleep(self.due - now);
         }
     }
 }
@@ -269,14 +249,10 @@ impl Renderer for View {
 
     fn swap(&mut self, _frame: u64) {
         if self.is_shown && self.failure().is_none() {
-            if let Err(error) = self.present() {
-                self.failure = Some(error);
-            }
-            self.next_shown = self.next_shown.max(Instant::now() - self.between_shown);
-            self.next_shown += self.between_shown;
+            self.redraw();
         }
         self.attend(Duration::ZERO);
-        self.keep_pace();
-        self.is_shown = Instant::now() + self.time_step / 2 >= self.next_shown;
+        self.pace.keep(self.controls.is_real_time);
+        self.is_shown = self.pace.shows(self.painter.gpu());
     }
 }
