@@ -12,6 +12,8 @@ use dualframe_tests::program::{NO_ADAPTERS, command, told};
 fn run(args: &[&str], environment: &[(&str, &str)]) -> Output {
     let few = ["--objects", "5", "--frames", "5"];
     let mut command = command(&[&few, args].concat());
+    // Without it drivers complain.
+    command.env("XDG_RUNTIME_DIR", std::env::temp_dir());
     command.envs(environment.iter().copied()).output().expect("the program starts")
 }
 
@@ -49,7 +51,10 @@ fn no_adapter() {
     for environment in NO_ADAPTERS {
         for args in drawing {
             refused(&run(args, environment), "mesa-vulkan-drivers");
-            refused(&run(&[args, &["--adapter", "any"]].concat(), environment), "no graphics adapter");
+            refused(
+                &run(&[args, &["--adapter", "any"]].concat(), environment),
+                "no graphics adapter",
+            );
         }
     }
 }

@@ -23,7 +23,11 @@ impl Outputs {
             open(&file_of_frame(folder, 0))?;
         }
         let open = |path: &Option<_>| path.as_deref().map(open).transpose();
-        Ok(Self { json: open(&args.json)?, picture: open(&args.picture)?, trace: open(&args.trace)? })
+        Ok(Self {
+            json: open(&args.json)?,
+            picture: open(&args.picture)?,
+            trace: open(&args.trace)?,
+        })
     }
 }
 

@@ -26,8 +26,8 @@ use x11rb::rust_connection::RustConnection;
 const PATIENCE: Duration = Duration::from_secs(300);
 /// How long one waits before looking again.
 const GLANCE: Duration = Duration::from_millis(100);
-/// For how many glances a picture that stands still has not changed.
-const STILL: usize = 15;
+/// For how long a picture that stands still has not changed.
+pub(crate) const STILL: Duration = Duration::from_millis(1_500);
 
 /// Looks until `look` finds something.
 fn wait_for<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
@@ -149,7 +149,6 @@ impl Desktop {
     }
 }
 
-
 /// The program while it shows a window.
 pub(crate) struct Session<'a> {
     desktop: &'a Desktop,
@@ -178,12 +177,14 @@ impl Session<'_> {
 
     /// Looks until the picture stands still.
     pub(crate) fn wait_until_still(&mut self) -> Screenshot {
-        let (mut last, mut glances) = (None, 0);
+        let (mut last, mut since) = (None, Instant::now());
         wait_for("a picture that stands still", || {
+            self.check();
             let now = self.screenshot();
-            glances = if now.is_some() && now == last { glances + 1 } else { 0 };
-            last = now;
-            if glances == STILL { last.take() } else { None }
+            if now.is_none() || now != last {
+                (last, since) = (now, Instant::now());
+            }
+            if since.elapsed() > STILL { last.take() } else { None }
         })
     }
 
@@ -207,12 +208,6 @@ impl Session<'_> {
     pub(crate) fn press(&self, is_down: bool) {
         let kind = if is_down { BUTTON_PRESS_EVENT } else { BUTTON_RELEASE_EVENT };
         self.desktop.fake(kind, 1, 0, 0);
-    }
-
-    pub(crate) fn click(&self, x: i16, y: i16) {
-        self.move_to(x, y);
-        self.press(true);
-        self.press(false);
     }
 
     /// Strikes the key of a symbol; letters are their own.
@@ -253,8 +248,7 @@ impl Session<'_> {
 
     /// Waits for its end, which is to be a sound one, and gives back what it reported.
     pub(crate) fn end(mut self) -> Value {
-        let status =
-            wait_for("the end", || self.child.try_wait().expect("it can be waited for"));
+        let status = wait_for("the end", || self.child.try_wait().expect("it can be waited for"));
         let (printed, told) = (self.read("stdout"), self.read("stderr"));
         assert!(status.success() && told.is_empty(), "{status}: {told}");
         assert!(printed.contains("state hash"), "{printed}");
@@ -273,6 +267,9 @@ impl Drop for Session<'_> {
         let _ = self.child.wait();
     }
 }
+
+/// The colour of a slider's bar.
+const BAR: [u8; 3] = [60; 3];
 
 /// A window's pixels.
 #[derive(Clone, PartialEq)]
@@ -293,6 +290,20 @@ impl Screenshot {
     /// Whether anything was drawn: a window is black before.
     pub(crate) fn is_drawn(&self) -> bool {
         self.pixel(self.width - 1, self.height - 1) != [0; 3]
+    }
+
+    /// The first of the overlay's sliders from above: the right end of its bar.
+    pub(crate) fn first_slider(&self) -> (usize, usize) {
+        // Where the bars of sliders are, and no border or text of anything else.
+        const WITHIN: (usize, usize) = (130, 165);
+        let color = |y: usize| {
+            let first = self.pixel(WITHIN.0, y);
+            (WITHIN.0..WITHIN.1).all(|x| self.pixel(x, y) == first).then_some(first)
+        };
+        let is_bar = |y: &usize| (*y..y + 6).all(|y| color(y) == Some(BAR));
+        let y = (0..self.height - 6).find(is_bar).expect("the overlay is shown") + 3;
+        let right = (WITHIN.1..self.width).find(|&x| self.pixel(x, y) != BAR);
+        (right.expect("it ends") - 3, y)
     }
 
     /// The number of pixels that another one of the same size has in another colour.
