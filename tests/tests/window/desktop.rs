@@ -22,6 +22,8 @@ use x11rb::protocol::xproto::{
 use x11rb::protocol::xtest::ConnectionExt as _;
 use x11rb::rust_connection::RustConnection;
 
+/// The display's width and height, in pixels.
+const SCREEN: (u16, u16) = (1280, 1024);
 /// How long anything is waited for: a software adapter on a busy machine is slow.
 const PATIENCE: Duration = Duration::from_secs(300);
 /// How long one waits before looking again.
@@ -69,8 +71,8 @@ pub(crate) struct Desktop {
 impl Desktop {
     pub(crate) fn start() -> Self {
         let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp"])
-            .arg("-terminate")
+            .args(["-screen", "0", &format!("{}x{}x24", SCREEN.0, SCREEN.1)])
+            .args(["-displayfd", "1", "-nolisten", "tcp", "-terminate"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -188,11 +190,11 @@ impl Session<'_> {
         })
     }
 
-    /// The window's picture; `None` if it cannot be seen.
+    /// The window's picture, as far as it is on the display; `None` if it cannot be seen.
     fn screenshot(&self) -> Option<Screenshot> {
         let connection = &self.desktop.connection;
         let size = connection.get_geometry(self.window).ok()?.reply().ok()?;
-        let (width, height) = (size.width, size.height);
+        let (width, height) = (size.width.min(SCREEN.0), size.height.min(SCREEN.1));
         let format = ImageFormat::Z_PIXMAP;
         let image = connection.get_image(format, self.window, 0, 0, width, height, !0).ok()?;
         let pixels = image.reply().ok()?.data;
@@ -268,9 +270,6 @@ impl Drop for Session<'_> {
     }
 }
 
-/// The colour of a slider's bar.
-const BAR: [u8; 3] = [60; 3];
-
 /// A window's pixels.
 #[derive(Clone, PartialEq)]
 pub(crate) struct Screenshot {
@@ -296,13 +295,12 @@ impl Screenshot {
     pub(crate) fn first_slider(&self) -> (usize, usize) {
         // Where the bars of sliders are, and no border or text of anything else.
         const WITHIN: (usize, usize) = (130, 165);
-        let color = |y: usize| {
-            let first = self.pixel(WITHIN.0, y);
-            (WITHIN.0..WITHIN.1).all(|x| self.pixel(x, y) == first).then_some(first)
-        };
-        let is_bar = |y: &usize| (*y..y + 6).all(|y| color(y) == Some(BAR));
-        let y = (0..self.height - 6).find(is_bar).expect("the overlay is shown") + 3;
-        let right = (WITHIN.1..self.width).find(|&x| self.pixel(x, y) != BAR);
+        // Apart from the dithering.
+        let is_bar = |x, y| self.pixel(x, y).iter().all(|color| (58..=62).contains(color));
+        let is_row = |y| (WITHIN.0..WITHIN.1).all(|x| is_bar(x, y));
+        let top = (0..self.height - 6).find(|&top| (top..top + 6).all(is_row));
+        let y = top.expect("the overlay is shown") + 3;
+        let right = (WITHIN.1..self.width).find(|&x| !is_bar(x, y));
         (right.expect("it ends") - 3, y)
     }
 
