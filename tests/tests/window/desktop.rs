@@ -177,6 +177,22 @@ impl Session<'_> {
         assert!(ended.is_none(), "it ended: {ended:?} {}", self.read("stderr"));
     }
 
+    /// Looks until something has been seen for a while.
+    pub(crate) fn wait_until_lasting(
+        &mut self,
+        what: &str,
+        is_there: impl Fn(&Screenshot) -> bool,
+    ) {
+        let mut since = Instant::now();
+        wait_for(what, || {
+            self.check();
+            if !self.screenshot().is_some_and(|now| is_there(&now)) {
+                since = Instant::now();
+            }
+            (since.elapsed() > 2 * STILL).then_some(())
+        });
+    }
+
     /// Looks until the picture stands still.
     pub(crate) fn wait_until_still(&mut self) -> Screenshot {
         let (mut last, mut since) = (None, Instant::now());

@@ -16,9 +16,9 @@ const ONE: [&str; 6] = ["--objects", "1", "--threads", "2", "--size", "640x480"]
 /// The middle of that picture.
 const MIDDLE: (i16, i16) = (320, 240);
 
-/// How far down the middle of that particle is only where something pulls it there: left alone, it stays
-/// between about 210 and 250.
-const FAR_DOWN: usize = 265;
+/// How far down the middle of that particle stays only where something pulls it: left alone, it is at 190 to
+/// 240, and lower for a moment at most.
+const FAR_DOWN: usize = 270;
 
 /// Where the middle of the particle is: the only thing that is rather red than green.
 fn middle(picture: &Screenshot) -> (usize, usize) {
@@ -61,7 +61,6 @@ fn a_drag_moves_a_particle() {
         // The overlay would hide half of it.
         session.strike('h');
         let before = session.wait_until_still();
-        assert!(middle(&before).1 < FAR_DOWN);
         session.move_to(MIDDLE.0, MIDDLE.1);
         if is_dragged {
             session.press(true);
@@ -69,7 +68,7 @@ fn a_drag_moves_a_particle() {
         session.move_to(MIDDLE.0 + 150, MIDDLE.1 + 110);
         session.strike(' ');
         if is_dragged {
-            session.wait_for("the particle to follow", |now| middle(now).1 > FAR_DOWN);
+            session.wait_until_lasting("the particle to follow", |now| middle(now).1 > FAR_DOWN);
         } else {
             session.wait_for("another picture", |now| now.difference(&before) > 0);
         }
@@ -99,7 +98,7 @@ fn the_slider_of_gravity_lets_a_particle_fall() {
     session.wait_until_still();
     session.strike('h');
     session.strike(' ');
-    session.wait_for("the particle to lie on the floor", |now| middle(now).1 > FAR_DOWN);
+    session.wait_until_lasting("the particle to lie on the floor", |now| middle(now).1 > FAR_DOWN);
     let report = session.close();
     assert_ne!(report["state_hash"], untouched(&ONE, &report["frames"]));
 }
