@@ -321,4 +321,21 @@ mod tests {
         assert_eq!(pushed.push_segments(&[1, 2, 3, 4, 5], &[2, 5]), Err(full));
         assert_eq!((pushed.first(), pools.used(Frame(0))), (NONE, 0));
     }
+    #[test]
+    fn two_frames_share_no_room() {
+        let contacts: [ContactSlot<u8>; 8] = [const { ContactSlot::new() }; 8];
+        let segments = [const { SegmentSlot::new() }; 8];
+        let pools = Pools::new(&contacts, &segments);
+        let mut pushed = [0, 1].map(|frame| Contacts::new(&pools, Frame(frame)));
+        for round in 0..2 {
+            for (frame, pushed) in (0..).zip(&mut pushed) {
+                assert_eq!(pushed.push(&[round, frame]), Ok(()));
+            }
+        }
+        for (frame, pushed) in (0..).zip(pushed) {
+            // SAFETY: nothing is pushed and nothing is reset while the segments are read.
+            let read = unsafe { pools.segments(pushed.first()) };
+            assert!(read.eq([[0, frame], [1, frame]]), "frame {frame}");
+        }
+    }
 }

@@ -102,3 +102,23 @@ impl Window {
         Frame(self.open.load(site::FRAME_OPEN_LOOK))
     }
 }
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_wrap() {
+        let last = Frame(u32::MAX);
+        assert_eq!((last.next(), Frame(0).previous()), (Frame(0), last));
+        assert_eq!([last, last.next(), Frame(7)].map(Frame::parity), [1, 0, 1]);
+        for frame in [Frame(0), Frame(7), last] {
+            let farthest = Frame(frame.0.wrapping_add((1 << 31) - 1));
+            assert!(!frame.is_before(frame));
+            for later in [frame.next(), farthest] {
+                assert!(frame.is_before(later) && !later.is_before(frame));
+            }
+            assert!(!frame.is_before(farthest.next()), "too far to tell");
+        }
+    }
+}

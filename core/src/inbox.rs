@@ -219,3 +219,29 @@ impl<M: Send + Sync> Drop for Mail<'_, '_, M> {
         self.for_each(drop);
     }
 }
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn letters_come_in_order_whoever_posted_first() {
+        let mut slots = [const { LetterSlot::new() }; 6];
+        let mut queue = [const { QueueSlot::new() }; 8];
+        let post = Post::new(&mut slots, &mut queue).unwrap_or_else(|full| panic!("{full}"));
+        let inbox = Inbox::new();
+        let from = |sender, sequence| From { sender, sequence };
+        let ranks = [from(2, 0), from(0, 1), from(1, 1), from(1, 0), from(0, 2)];
+        // Twice: those that are not read leave room for others.
+        for frame in [Frame(0), Frame(1)] {
+            for (number, from) in ranks.into_iter().enumerate() {
+                assert_eq!(post.post(&inbox, frame, from, number), Ok(()));
+            }
+            assert_eq!(post.post(&inbox, frame.next(), from(0, 0), 9), Ok(()));
+            let due = post.collect(&inbox, frame.next()).take(4);
+            assert!(due.eq([(ranks[1], 1), (ranks[4], 4), (ranks[3], 3), (ranks[2], 2)]));
+            let next = post.collect(&inbox, frame.next().next());
+            assert!(next.eq([(from(0, 0), 9)]), "what was posted in a frame stays for the next");
+        }
+    }
+}

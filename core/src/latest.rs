@@ -172,3 +172,47 @@ impl<T: Copy + Send + Sync, const SLOTS: usize> Drop for Reader<'_, T, SLOTS> {
         self.cell.readers.fetch_sub(1, site::READERS_COUNT);
     }
 }
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    fn reader<'c, const SLOTS: usize>(readers: &Readers<'c, u32, SLOTS>) -> Reader<'c, u32, SLOTS> {
+        readers.reader().unwrap_or_else(|full| panic!("{full}"))
+    }
+
+    #[test]
+    fn readers_see_the_newest() {
+        let mut cell = Latest::<u32, 5>::new(0);
+        for round in 0..3 {
+            let (mut writer, readers) = cell.split();
+            let (mut often, mut seldom) = (reader(&readers), reader(&readers));
+            for value in 1000 * round + 1..1000 * (round + 1) {
+                writer.publish(value);
+                let mut new = reader(&readers);
+                assert_eq!([new.read(), often.read(), often.read()], [value; 3]);
+                if value % 7 == 0 {
+                    assert_eq!(seldom.read(), value);
+                }
+            }
+        }
+    }
+    #[test]
+    fn nobody_writes_where_somebody_reads() {
+        let mut cell = Latest::<u32, 4>::new(0);
+        for round in 1..4 {
+            let (mut writer, readers) = cell.split();
+            let mut early = reader(&readers);
+            let before = early.read();
+            writer.publish(100 * round);
+            let mut late = reader(&readers);
+            let after = late.read();
+            (1..20).for_each(|value| writer.publish(100 * round + value));
+            for (reader, value) in [(&early, before), (&late, after)] {
+                // SAFETY: the reader is inside the slot.
+                let kept = unsafe { readers.cell.slot(reader.inside).value.with(|kept| *kept) };
+                assert_eq!(kept, value);
+            }
+        }
+    }
+}

@@ -184,4 +184,19 @@ mod tests {
         assert_eq!((ring.pop(), ring.pop()), (Some(3), None));
         assert_eq!(IndexRing::new(&mut []).map(drop), Err(full(0, 1)));
     }
+    /// Invariant 7: the cell is written, its pusher sleeps before it moves the tail.
+    #[test]
+    fn a_pusher_that_is_suspended_stops_nobody() {
+        let mut slots = [const { QueueSlot::new() }; 4];
+        let ring = IndexRing::new(&mut slots).unwrap_or_else(|full| panic!("{full}"));
+        for _lap in 0..3 {
+            assert_eq!(ring.push(1), Ok(()));
+            let tail = ring.tail.load(site::EXCLUSIVE);
+            let word = ring.cycle(tail) << ring.slot_bits | 2;
+            ring.slot(tail).store(word, site::EXCLUSIVE);
+            assert_eq!(ring.push(3), Ok(()));
+            assert_eq!([(); 4].map(|()| ring.pop()), [Some(1), Some(2), Some(3), None]);
+            assert!(ring.looks_empty());
+        }
+    }
 }

@@ -73,3 +73,30 @@ impl Stages {
         self.0 == 0
     }
 }
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_are_sets() {
+        for stage in Stage::ALL {
+            let only = Stages::NONE.with_if(stage, true);
+            assert!(!only.is_empty() && Stages::NONE.is_empty());
+            assert_eq!(Stages::NONE.with_if(stage, false), Stages::NONE);
+            assert_eq!(
+                (only.with_if(stage, true), only.union(only)),
+                (only, only),
+                "once is enough"
+            );
+            for other in Stage::ALL {
+                let both = only.with_if(other, true);
+                assert_eq!(both, only.union(Stages::NONE.with_if(other, true)));
+                assert_eq!(only.contains(other), other == stage);
+                assert!(both.contains(stage) && both.contains(other));
+                let rest = if other == stage { Stages::NONE } else { only };
+                assert_eq!((both.without(other), only.without(other)), (rest, rest));
+            }
+        }
+    }
+}

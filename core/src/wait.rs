@@ -143,3 +143,93 @@ impl Bells {
         }
     }
 }
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use std::{sync::Mutex, vec, vec::Vec};
+
+    /// Notes on which bell somebody is to sleep, and how many are to be woken. The holders' bell is `true`.
+    #[derive(Default)]
+    struct Notes {
+        slept: Mutex<Vec<bool>>,
+        woken: Mutex<Vec<(bool, u32)>>,
+    }
+
+    impl Waiting for Notes {
+        fn sleep(&self, bell: &Bell, _: Epoch) {
+            self.slept.lock().unwrap_or_else(|poison| poison.into_inner()).push(bell.for_holders);
+        }
+
+        fn wake(&self, bell: &Bell, count: u32) {
+            let mut woken = self.woken.lock().unwrap_or_else(|poison| poison.into_inner());
+            woken.push((bell.is_for_holders(), count));
+        }
+    }
+
+    impl Notes {
+        fn slept(self) -> Vec<bool> {
+            self.slept.into_inner().unwrap_or_default()
+        }
+
+        fn woken(self) -> Vec<(bool, u32)> {
+            self.woken.into_inner().unwrap_or_default()
+        }
+    }
+
+    /// Who is woken for `any` work units and `renders`, while so many holders and others sleep.
+    fn woken(holders: u32, others: u32, any: u32, renders: u32) -> Vec<(bool, u32)> {
+        let (bells, notes) = (Bells::new(), Notes::default());
+        bells.holders.sleepers.fetch_add(holders, site::BELL_ANNOUNCE);
+        bells.others.sleepers.fetch_add(others, site::BELL_ANNOUNCE);
+        bells.announce(&notes, any, renders);
+        notes.woken()
+    }
+
+    #[test]
+    fn as_many_are_woken_as_there_is_work_for() {
+        assert_eq!(woken(1, 3, 2, 0), [(false, 2)]);
+        assert_eq!(woken(3, 1, 3, 0), [(false, 1), (true, 2)], "the others are too few");
+        assert_eq!(woken(2, 3, 0, 1), [(true, 1)], "only holders can render");
+        assert_eq!(woken(3, 3, 2, 1), [(false, 2), (true, 1)]);
+        assert_eq!(woken(3, 0, 1, 1), [(true, 2)]);
+        assert_eq!(woken(1, 1, 9, 9), [(false, 1), (true, 1)]);
+        assert_eq!(woken(0, 0, 9, 9), [], "nobody sleeps");
+    }
+
+    #[test]
+    fn who_finds_work_does_not_sleep() {
+        for finds in [false, true] {
+            let (bell, notes) = (Bell::new(true), Notes::default());
+            let mut looked = false;
+            bell.sleep_unless(&notes, || {
+                looked = true;
+                finds
+            });
+            assert!(looked);
+            assert_eq!(bell.ring(&notes, 1), 0, "nobody is a sleeper any more");
+            assert_eq!(notes.slept(), if finds { vec![] } else { vec![true] });
+        }
+    }
+
+    #[test]
+    fn who_was_called_meanwhile_does_not_sleep() {
+        let bell = Bell::new(false);
+        // Comes back at all: the bell is rung between the look for work and the sleep.
+        bell.sleep_unless(&Spin, || {
+            assert_eq!(bell.ring(&Spin, 3), 1, "one listens");
+            false
+        });
+    }
+
+    #[test]
+    fn a_reference_waits_like_what_it_refers_to() {
+        let (bell, notes) = (Bell::new(true), Notes::default());
+        Waiting::sleep(&&notes, &bell, Epoch(0));
+        Waiting::wake(&&notes, &bell, 5);
+        assert_eq!((notes.slept(), bell.rung_since(Epoch(0))), (vec![true], false));
+        let notes = Notes::default();
+        Waiting::wake(&&notes, &bell, 5);
+        assert_eq!(notes.woken(), [(true, 5)]);
+    }
+}

@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let is_test = std::env::args().any(|argument| argument == "--test");
     let plan = match is_test {
         true => Plan { rounds: 1, frames: 4, objects: &[20] },
-        false => Plan { rounds: 15, frames: 120, objects: &[100, 300, 1_000] },
+        false => Plan { rounds: 9, frames: 40, objects: &[100, 300, 1_000] },
     };
     let gpu = Gpu::new(None)?;
     println!("{}, {} by {} pixels", gpu.title(), SIZE.0, SIZE.1);

@@ -55,6 +55,14 @@ pub enum GraphicsError {
         /// What a buffer may have, in bytes.
         most: u64,
     },
+    /// A volume is larger than the adapter can hold.
+    #[error("a volume of {dims:?} voxels was to be drawn; the adapter allows {most} a side")]
+    Volume {
+        /// Its voxels along each axis.
+        dims: [u32; 3],
+        /// The most voxels along an axis.
+        most: u32,
+    },
     /// The device failed while it was drawing.
     #[error("the graphics device failed: {reason}")]
     Lost {

@@ -1,25 +1,27 @@
 //! A frame's numbers: camera, light, shadow map.
 
+use std::num::NonZero;
+
 use bytemuck::{Pod, Zeroable};
 use dualframe_sim::geometry::Bounds;
 use glam::camera::rh::proj::directx::orthographic;
 use glam::camera::rh::view::look_to_mat4;
 use glam::{Mat4, Vec3};
 use wgpu::{
-    BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, Buffer, BufferDescriptor,
-    BufferUsages, CompareFunction, Device, FilterMode, LoadOp, Operations, Queue,
-    RenderPassDepthStencilAttachment, SamplerDescriptor, StoreOp, TextureUsages, TextureView,
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, Buffer, BufferBinding,
+    CompareFunction, Device, FilterMode, LoadOp, Operations, RenderPassDepthStencilAttachment,
+    Sampler, SamplerDescriptor, StoreOp, TextureUsages, TextureView,
 };
 
 use crate::camera::{Camera, Frustum};
 use crate::look::{Coloring, Look, Quality};
-use crate::surface::{Layouts, SHADOW};
+use crate::surface::{GLOBALS, Layouts, SHADOW};
 use crate::target::texture;
 
 /// What shaders read; the layout of `Globals` in `common.wgsl`.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Numbers {
+pub(crate) struct Numbers {
     view_projection: [f32; 16],
     inverse_view_projection: [f32; 16],
     light_projection: [f32; 16],
@@ -46,6 +48,14 @@ pub(crate) struct View {
     throw: Vec3,
 }
 
+impl Numbers {
+    pub(crate) fn as_words(&self) -> &[f32] {
+        bytemuck::cast_slice(std::slice::from_ref(self))
+    }
+}
+
+const _: () = assert!(size_of::<Numbers>() <= GLOBALS * size_of::<f32>());
+
 impl View {
     pub(crate) fn new(camera: Camera, look: Look, aspect: f32) -> Self {
         let view_projection = camera.view_projection(aspect);
@@ -68,13 +78,13 @@ impl View {
         self.frustum.may_see(&bounds.union(&shadow))
     }
 
-    /// This frame's numbers with another projection, as bytes.
-    pub(crate) fn numbers_seen_by(&self, view_projection: Mat4) -> Vec<u8> {
-        let numbers = Self { view_projection, ..*self }.numbers();
-        bytemuck::bytes_of(&numbers).to_vec()
+    /// This frame as another projection sees it.
+    pub(crate) fn seen_by(&self, view_projection: Mat4) -> Self {
+        Self { view_projection, ..*self }
     }
 
-    fn numbers(&self) -> Numbers {
+    /// What shaders read.
+    pub(crate) fn numbers(&self) -> Numbers {
         let Look { focus, room, coloring, quality, .. } = self.look;
         Numbers {
             view_projection: self.view_projection.to_cols_array(),
@@ -120,10 +130,10 @@ fn light_projection(look: &Look) -> (Mat4, f32) {
     (projection * view, (high.x - low.x).max(high.y - low.y))
 }
 
-/// The frame's numbers on the device, and its shadow map.
+/// The frame's numbers and its shadow map, as shaders are given them.
 pub(crate) struct Globals {
-    buffer: Buffer,
     map: TextureView,
+    sampler: Sampler,
     /// Without the shadow map, for drawing it.
     pub(crate) plain: BindGroup,
     pub(crate) lit: BindGroup,
@@ -133,13 +143,13 @@ impl Globals {
     /// The numbers' size, in bytes.
     pub(crate) const SIZE: u64 = size_of::<Numbers>() as u64;
 
-    pub(crate) fn new(device: &Device, layouts: &Layouts, quality: Quality) -> Self {
-        let buffer = device.create_buffer(&BufferDescriptor {
-            label: Some("globals"),
-            size: Self::SIZE,
-            usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+    /// `numbers` is a buffer that begins with the frame's numbers.
+    pub(crate) fn new(
+        device: &Device,
+        layouts: &Layouts,
+        quality: Quality,
+        numbers: &Buffer,
+    ) -> Self {
         let size = (quality.shadow_size(), quality.shadow_size());
         let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING;
         let map = texture(device, "shadow map", SHADOW, size, 1, usage);
@@ -151,23 +161,15 @@ impl Globals {
             compare: Some(CompareFunction::LessEqual),
             ..Default::default()
         });
-        let numbers = BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() };
-        let group = |layout, entries: &[BindGroupEntry<'_>]| {
-            let descriptor = BindGroupDescriptor { label: Some("globals"), layout, entries };
-            device.create_bind_group(&descriptor)
-        };
-        let map_entry = BindGroupEntry { binding: 1, resource: BindingResource::TextureView(&map) };
-        let sampler = BindGroupEntry { binding: 2, resource: BindingResource::Sampler(&sampler) };
-        Self {
-            plain: group(&layouts.globals, std::slice::from_ref(&numbers)),
-            lit: group(&layouts.lit, &[numbers.clone(), map_entry, sampler]),
-            buffer,
-            map,
-        }
+        let plain = plain(device, layouts, numbers);
+        let lit = lit(device, layouts, numbers, (&map, &sampler));
+        Self { map, sampler, plain, lit }
     }
 
-    pub(crate) fn upload(&self, queue: &Queue, view: &View) {
-        queue.write_buffer(&self.buffer, 0, bytemuck::bytes_of(&view.numbers()));
+    /// The numbers are in another buffer.
+    pub(crate) fn rebind(&mut self, device: &Device, layouts: &Layouts, numbers: &Buffer) {
+        self.plain = plain(device, layouts, numbers);
+        self.lit = lit(device, layouts, numbers, (&self.map, &self.sampler));
     }
 
     /// The shadow map, to draw it.
@@ -176,4 +178,34 @@ impl Globals {
         let view = &self.map;
         RenderPassDepthStencilAttachment { view, depth_ops: Some(ops), stencil_ops: None }
     }
+}
+
+/// The beginning of a buffer.
+fn beginning(buffer: &Buffer) -> BindGroupEntry<'_> {
+    let size = NonZero::new(Globals::SIZE);
+    let resource = BindingResource::Buffer(BufferBinding { buffer, offset: 0, size });
+    BindGroupEntry { binding: 0, resource }
+}
+
+pub(crate) fn plain(device: &Device, layouts: &Layouts, numbers: &Buffer) -> BindGroup {
+    device.create_bind_group(&BindGroupDescriptor {
+        label: Some("globals"),
+        layout: &layouts.globals,
+        entries: &[beginning(numbers)],
+    })
+}
+
+fn lit(
+    device: &Device,
+    layouts: &Layouts,
+    numbers: &Buffer,
+    (map, sampler): (&TextureView, &Sampler),
+) -> BindGroup {
+    let map = BindGroupEntry { binding: 1, resource: BindingResource::TextureView(map) };
+    let sampler = BindGroupEntry { binding: 2, resource: BindingResource::Sampler(sampler) };
+    device.create_bind_group(&BindGroupDescriptor {
+        label: Some("lit"),
+        layout: &layouts.lit,
+        entries: &[beginning(numbers), map, sampler],
+    })
 }

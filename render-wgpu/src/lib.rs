@@ -28,3 +28,4 @@ pub mod renderer;
 mod room;
 mod surface;
 mod target;
+mod volume;

@@ -6,16 +6,17 @@ use bytemuck::{Pod, Zeroable};
 use dualframe_sim::object::ObjectId;
 use glam::{Mat4, Quat, Vec2, Vec3};
 use wgpu::{
-    BindGroup, BindGroupDescriptor, BindGroupEntry, Buffer, BufferDescriptor, BufferUsages,
-    ColorTargetState, CommandEncoder, Device, Extent3d, FragmentState, LoadOp, MultisampleState,
-    Operations, PipelineLayoutDescriptor, PrimitiveState, RenderPassColorAttachment,
-    RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPipeline,
-    RenderPipelineDescriptor, ShaderModuleDescriptor, ShaderSource, StoreOp, TexelCopyBufferInfo,
-    TexelCopyBufferLayout, Texture, TextureFormat, TextureUsages, TextureView, VertexState,
+    BindGroup, Buffer, BufferDescriptor, BufferUsages, ColorTargetState, CommandEncoder, Device,
+    Extent3d, FragmentState, LoadOp, MultisampleState, Operations, PipelineLayoutDescriptor,
+    PrimitiveState, RenderPassColorAttachment, RenderPassDepthStencilAttachment,
+    RenderPassDescriptor, RenderPipeline, RenderPipelineDescriptor, ShaderModuleDescriptor,
+    ShaderSource, StoreOp, TexelCopyBufferInfo, TexelCopyBufferLayout, Texture, TextureFormat,
+    TextureUsages, TextureView, VertexState,
 };
 
 use crate::auxiliary::{Context, GpuUnit};
 use crate::error::GraphicsError;
+use crate::globals::{self, Globals};
 use crate::surface::{INSTANCES, Layouts};
 use crate::target::{DEPTH, texture};
 
@@ -93,18 +94,14 @@ pub(crate) struct Picker {
 }
 
 impl Picker {
-    pub(crate) fn new(device: &Device, layouts: &Layouts, globals_size: u64) -> Self {
+    pub(crate) fn new(device: &Device, layouts: &Layouts) -> Self {
         let numbers = device.create_buffer(&BufferDescriptor {
             label: Some("picking"),
-            size: globals_size,
+            size: Globals::SIZE,
             usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let globals = device.create_bind_group(&BindGroupDescriptor {
-            label: Some("picking"),
-            layout: &layouts.globals,
-            entries: &[BindGroupEntry { binding: 0, resource: numbers.as_entire_binding() }],
-        });
+        let globals = globals::plain(device, layouts, &numbers);
         let pixel = |format, usage| texture(device, "picking", format, (1, 1), 1, usage);
         let hit = pixel(FORMAT, TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC);
         let depth = pixel(DEPTH.format, TextureUsages::RENDER_ATTACHMENT);
@@ -123,8 +120,10 @@ impl Picker {
         let (width, height) = context.size;
         let scale = Vec2::new(width as f32, height as f32).extend(1.0);
         let crop = Mat4::from_scale(scale) * Mat4::from_translation(-point.extend(0.0));
-        let numbers = context.view.numbers_seen_by(crop * context.view.view_projection);
-        context.gpu.queue.write_buffer(&self.numbers, 0, &numbers);
+        let view = context.view.seen_by(crop * context.view.view_projection);
+        let numbers = view.numbers();
+        let bytes = bytemuck::cast_slice(numbers.as_words());
+        context.gpu.queue.write_buffer(&self.numbers, 0, bytes);
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("picking"),
             color_attachments: &[Some(RenderPassColorAttachment {

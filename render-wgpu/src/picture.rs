@@ -7,9 +7,11 @@ use std::path::Path;
 use wgpu::{
     Buffer, BufferDescriptor, BufferUsages, COPY_BYTES_PER_ROW_ALIGNMENT, CommandEncoder, Device,
     Extent3d, MapMode, PollType, TexelCopyBufferInfo, TexelCopyBufferLayout, Texture,
+    TextureFormat,
 };
 
 use crate::error::GraphicsError;
+use crate::gpu::Gpu;
 
 /// Bytes of a pixel.
 const PIXEL: u32 = 4;
@@ -51,8 +53,27 @@ impl Picture {
     }
 }
 
+/// Reads a texture of one of the formats Rgba8 and Bgra8, linear or sRGB, that can be copied from, after
+/// everything submitted so far.
+///
+/// # Errors
+/// The device failed.
+pub fn read_texture(gpu: &Gpu, texture: &Texture) -> Result<Picture, GraphicsError> {
+    let Gpu { device, queue, .. } = gpu;
+    let readback = Readback::new(device, texture.width(), texture.height());
+    let mut encoder = device.create_command_encoder(&Default::default());
+    readback.copy(&mut encoder, texture);
+    queue.submit([encoder.finish()]);
+    let picture = readback.read(device);
+    let mut picture = picture.map_err(|error| gpu.failure().unwrap_or(error))?;
+    if matches!(texture.format(), TextureFormat::Bgra8Unorm | TextureFormat::Bgra8UnormSrgb) {
+        picture.pixels.chunks_exact_mut(PIXEL as usize).for_each(|pixel| pixel.swap(0, 2));
+    }
+    Ok(picture)
+}
+
 /// Memory that a picture is read through.
-pub(crate) struct Readback {
+struct Readback {
     buffer: Buffer,
     width: u32,
     height: u32,
@@ -61,7 +82,7 @@ pub(crate) struct Readback {
 }
 
 impl Readback {
-    pub(crate) fn new(device: &Device, width: u32, height: u32) -> Self {
+    fn new(device: &Device, width: u32, height: u32) -> Self {
         let stride = (width * PIXEL).next_multiple_of(COPY_BYTES_PER_ROW_ALIGNMENT);
         let buffer = device.create_buffer(&BufferDescriptor {
             label: Some("picture"),
@@ -73,7 +94,7 @@ impl Readback {
     }
 
     /// Copies a texture of this size after what was encoded so far.
-    pub(crate) fn copy(&self, encoder: &mut CommandEncoder, texture: &Texture) {
+    fn copy(&self, encoder: &mut CommandEncoder, texture: &Texture) {
         let layout = TexelCopyBufferLayout {
             offset: 0,
             bytes_per_row: Some(self.stride),
@@ -88,7 +109,7 @@ impl Readback {
     }
 
     /// Waits for what was submitted, and reads it.
-    pub(crate) fn read(&self, device: &Device) -> Result<Picture, GraphicsError> {
+    fn read(&self, device: &Device) -> Result<Picture, GraphicsError> {
         let bytes = read_buffer(device, &self.buffer)?;
         let (stride, row) = (self.stride as usize, (self.width * PIXEL) as usize);
         let pixels = bytes.chunks(stride).flat_map(|padded| &padded[..row]).copied().collect();
@@ -97,7 +118,7 @@ impl Readback {
 }
 
 /// Waits for what was submitted, and reads a buffer.
-pub(crate) fn read_buffer(device: &Device, buffer: &Buffer) -> Result<Vec<u8>, GraphicsError> {
+fn read_buffer(device: &Device, buffer: &Buffer) -> Result<Vec<u8>, GraphicsError> {
     let lost = |reason: String| GraphicsError::Lost { reason };
     let (told, told_out) = std::sync::mpsc::channel();
     buffer.map_async(MapMode::Read, .., move |mapped| {

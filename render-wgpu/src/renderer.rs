@@ -15,17 +15,19 @@ use crate::globals::{Globals, View};
 use crate::gpu::Gpu;
 use crate::look::Look;
 use crate::pick::Picker;
-use crate::picture::{Picture, Readback};
+use crate::picture::{Picture, read_texture};
 use crate::room::Room;
 use crate::surface::{Layouts, Surfaces};
 use crate::target::{Format, Target, texture};
+use crate::volume::Volumes;
 
 /// The format of pictures without a window.
 pub const OFFSCREEN_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 
 /// Draws the objects of a frame into whatever texture it is given.
 ///
-/// Objects are taken one by one, in any order; nothing is sent to the device before [`Painter::paint`].
+/// Objects are taken one by one, in any order; nothing is sent to the device before
+/// [`Painter::paint`] but what changed of volumes.
 pub struct Painter {
     gpu: Gpu,
     /// From where the next frame is seen.
@@ -35,6 +37,7 @@ pub struct Painter {
     layouts: Layouts,
     globals: Globals,
     surfaces: Surfaces,
+    volumes: Volumes,
     room: Room,
     picker: Picker,
     units: Units,
@@ -60,11 +63,13 @@ impl Painter {
         let device = &gpu.device;
         let format = Format { color, samples: look.quality.samples() };
         let layouts = Layouts::new(device);
+        let surfaces = Surfaces::new(device, &layouts, format);
         Ok(Self {
-            globals: Globals::new(device, &layouts, look.quality),
-            surfaces: Surfaces::new(device, &layouts, format),
+            globals: Globals::new(device, &layouts, look.quality, surfaces.buffer()),
+            surfaces,
+            volumes: Volumes::new(device, &layouts, format, look.quality),
             room: Room::new(device, &layouts, format),
-            picker: Picker::new(device, &layouts, Globals::SIZE),
+            picker: Picker::new(device, &layouts),
             units: Units::new(),
             target: Target::new(device, format, size.0, size.1),
             camera: Camera::around(&look.focus),
@@ -116,14 +121,15 @@ impl Painter {
     /// The number of objects taken for this frame: those that are not culled.
     #[must_use]
     pub fn drawn(&self) -> usize {
-        self.surfaces.count()
+        self.surfaces.count() + self.volumes.count()
     }
 
     /// Takes an object of this frame, unless neither it nor its shadow is in the picture.
     pub fn add(&mut self, object: &Object) {
-        let Self { gpu, layouts, surfaces, .. } = self;
+        let Self { gpu, layouts, surfaces, volumes, .. } = self;
         let view = self.view.get_or_insert_with(|| {
             surfaces.clear();
+            volumes.clear();
             View::new(self.camera, self.look, self.target.aspect())
         });
         if self.failure.is_some() || !view.may_see(&object.bounds()) {
@@ -134,6 +140,10 @@ impl Painter {
                 surfaces.add_mesh(&gpu.device, layouts, object, mesh, view.look.coloring);
             }
             Geometry::Rigid(rigid) => surfaces.add_rigid(&gpu.device, layouts, object, rigid),
+            Geometry::Volume(volume) => {
+                let added = volumes.add(&gpu.device, &gpu.queue, object, volume);
+                self.failure = added.err();
+            }
         }
     }
 
@@ -147,16 +157,21 @@ impl Painter {
     pub fn paint(&mut self, encoder: &mut CommandEncoder, picture: &TextureView) {
         let view = self.view.take().unwrap_or_else(|| {
             self.surfaces.clear();
+            self.volumes.clear();
             View::new(self.camera, self.look, self.target.aspect())
         });
         if self.failure().is_some() {
             return;
         }
         let Gpu { device, queue, .. } = &self.gpu;
-        self.globals.upload(queue, &view);
-        if let Err(error) = self.surfaces.upload(device, queue, &self.layouts) {
-            self.failure = Some(error);
-            return;
+        let numbers = view.numbers();
+        match self.surfaces.upload((device, queue), &self.layouts, numbers.as_words()) {
+            Ok(false) => {}
+            Ok(true) => self.globals.rebind(device, &self.layouts, self.surfaces.buffer()),
+            Err(error) => {
+                self.failure = Some(error);
+                return;
+            }
         }
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("shadows"),
@@ -164,6 +179,7 @@ impl Painter {
             ..Default::default()
         });
         self.surfaces.cast(&mut pass, &self.globals.plain);
+        self.volumes.cast(&mut pass, &self.globals.plain);
         drop(pass);
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("picture"),
@@ -175,6 +191,7 @@ impl Painter {
             self.room.paint(&mut pass, &self.globals.lit);
         }
         self.surfaces.paint(&mut pass, &self.globals.lit);
+        self.volumes.paint(&mut pass, &self.globals.lit);
         drop(pass);
         let Self { gpu, surfaces, picker, units, .. } = self;
         let size = (self.target.width, self.target.height);
@@ -200,7 +217,6 @@ pub struct Offscreen {
     pub painter: Painter,
     texture: Texture,
     view: TextureView,
-    readback: Readback,
     /// The frame submitted last: the device is at most one frame behind.
     submitted: Option<SubmissionIndex>,
 }
@@ -216,8 +232,7 @@ impl Offscreen {
         let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC;
         let texture = texture(device, "picture", OFFSCREEN_FORMAT, (width, height), 1, usage);
         let view = texture.create_view(&Default::default());
-        let readback = Readback::new(device, width, height);
-        Ok(Self { painter, texture, view, readback, submitted: None })
+        Ok(Self { painter, texture, view, submitted: None })
     }
 
     /// Reads the picture of the last frame.
@@ -228,12 +243,7 @@ impl Offscreen {
         if let Some(failure) = self.painter.failure() {
             return Err(failure);
         }
-        let Gpu { device, queue, .. } = self.painter.gpu();
-        let mut encoder = device.create_command_encoder(&Default::default());
-        self.readback.copy(&mut encoder, &self.texture);
-        queue.submit([encoder.finish()]);
-        let picture = self.readback.read(device);
-        picture.map_err(|error| self.painter.failure().unwrap_or(error))
+        read_texture(self.painter.gpu(), &self.texture)
     }
 }
 

@@ -10,9 +10,12 @@ use std::sync::Arc;
 use common::{after, agree, draw, golden, room, scene};
 use dualframe_render_wgpu::look::Coloring;
 use dualframe_render_wgpu::picture::Picture;
-use dualframe_sim::geometry::{Geometry, Mesh, Topology};
-use dualframe_sim::object::{Drawing, Object};
+use dualframe_sim::behavior::Fixed;
+use dualframe_sim::geometry::{Geometry, Mesh, Topology, Volume};
+use dualframe_sim::object::{Drawing, Group, Object, ObjectId};
+use dualframe_sim::scene::{bone_piece, drill_burr_hole};
 use glam::Vec3;
+use parry3d::math::Pose;
 
 const PARTICLES: usize = 40;
 
@@ -77,6 +80,48 @@ fn wrong_normals_are_seen() {
         object.geometry = Geometry::Mesh(mesh.expect("a particle is a mesh"));
     }
     is_seen(&objects);
+}
+
+/// A drilled piece of skull.
+fn drilled() -> Volume {
+    let mut bone = bone_piece(96, Pose::IDENTITY).expect("a small piece");
+    let side = bone.extent().x;
+    let entry = Vec3::new(0.5 * side, 0.5 * side, side);
+    drill_burr_hole(&mut bone, entry, Vec3::NEG_Z, 0.006, side);
+    bone
+}
+
+fn bone_of(volume: Volume) -> Picture {
+    let focus = volume.bounds();
+    let mut object = Object::new(ObjectId(0), Group(0), Geometry::Volume(volume), Fixed);
+    object.visual.color = [0.85, 0.8, 0.7, 1.0];
+    draw(&[object], focus, Coloring::Object)
+}
+
+#[test]
+#[ignore = "needs a graphics adapter; .ci/run has one"]
+fn golden_drilled_bone() {
+    golden("drilled-bone", &bone_of(drilled()));
+}
+
+#[test]
+#[ignore = "needs a graphics adapter; .ci/run has one"]
+fn an_undrawn_brick_is_seen() {
+    let right = drilled();
+    let (dims, spacing) = (right.dims(), right.spacing());
+    let all: Vec<u8> = right.densities().collect();
+    let whole = bone_of(right.clone());
+    // Of a brick that the picture shows, nothing was sent.
+    let brick = Vec3::new(2.0, 2.0, 4.0) * 16.0;
+    let is_sent = |[x, y, z]: [u32; 3]| {
+        let inside = |at: u32, first: f32| (first as u32..first as u32 + 16).contains(&at);
+        !(inside(x, brick.x) && inside(y, brick.y) && inside(z, brick.z))
+    };
+    let number = |[x, y, z]: [u32; 3]| ((z * dims[1] + y) * dims[0] + x) as usize;
+    let sent = |voxel| if is_sent(voxel) { all[number(voxel)] } else { 0 };
+    let without = Volume::from_fn(dims, spacing, right.pose, sent).expect("as large as before");
+    assert_ne!(without.digest(), right.digest(), "the brick is empty");
+    assert!(agree(&whole, &bone_of(without)).is_err());
 }
 
 #[test]

@@ -19,6 +19,7 @@
 //! | §7.1.1: particles | [`scene`] |
 //! | §7.2: the pipeline and what it is compared with | [`executor`] |
 //! | §7–§8: Eqs. 2–4, Figs. 11–17, Table 1 | `experiment`, with the feature of that name |
+//! | (not in the paper) computed tomography in, volumes out | `image`, with the feature of that name |
 //! | (not in the paper) what each worker did when | [`timeline`] |
 //! | (not in the paper) kernels in vector instructions | [`simd`] |
 
@@ -31,10 +32,13 @@ pub mod executor;
 #[cfg(feature = "experiment")]
 pub mod experiment;
 pub mod geometry;
+#[cfg(feature = "image")]
+pub mod image;
 pub mod interaction;
 pub mod mailbox;
 pub mod manager;
 pub mod message;
+mod mix;
 pub mod object;
 pub mod pool;
 pub mod render;

@@ -13,8 +13,9 @@ use crate::object::ObjectId;
 /// What is posted until frame f has been swapped — until the renderer's swap and the `on_frame` of that
 /// frame have returned — is processed in the updates of frame f + 2, none of which can have
 /// begun: two frames are in flight. What is posted between two runs is processed in the first frame of
-/// the next. An object processes messages from outside after those of other objects, in the order in
-/// which they were posted. So a message posted by the renderer's swap, by `on_frame` or between runs has
+/// the next or, if something posted until the last swap is still to come, with that in the second: no
+/// message overtakes another. An object processes messages from outside after those of other objects, in
+/// the order in which they were posted. So a message posted by the renderer's swap, by `on_frame` or between runs has
 /// the same effect every time, bit by bit, whatever the executor; one posted by another thread while
 /// frames run comes into whichever frame is due by then. Objects send each other messages by
 /// [`Input::post`](crate::behavior::Input::post), not from here.

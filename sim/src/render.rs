@@ -58,6 +58,11 @@ impl Renderer for NullRenderer {
         let sum = match &object.geometry {
             Geometry::Mesh(mesh) => mesh.positions.as_slices().map(bit_sum),
             Geometry::Rigid(rigid) => rigid.pose.translation.to_array().map(f32::to_bits),
+            Geometry::Volume(volume) => {
+                let [x, y, z] = volume.pose.translation.to_array().map(f32::to_bits);
+                let digest = volume.digest();
+                [x ^ digest as u32, y ^ (digest >> 32) as u32, z]
+            }
         };
         let [x, y, z] = sum.map(u64::from);
         let mixed = x ^ y.rotate_left(21) ^ z.rotate_left(42) ^ u64::from(object.id().0);

@@ -3,6 +3,8 @@
 use std::hash::Hasher;
 
 use fnv::FnvHasher;
+use glam::Vec3;
+use parry3d::math::Pose;
 
 use crate::geometry::{Geometry, Vectors};
 use crate::object::{Object, ObjectId};
@@ -10,7 +12,7 @@ use crate::object::{Object, ObjectId};
 /// The hash (FNV-1a, 64 bits) over the states of all objects, taken in the order of their numbers
 /// whatever order they come in.
 ///
-/// An object's state is its positions and velocities bit by bit, what its behaviour remembers, and
+/// An object's state is its positions, velocities and densities bit by bit, what its behaviour remembers, and
 /// whether it is quarantined; of a quarantined object only that counts.
 #[derive(Clone, Debug, Default)]
 pub struct StateHash {
@@ -51,15 +53,24 @@ pub fn object_hash(object: &Object) -> u64 {
             write_vectors(&mut hasher, &mesh.velocities);
         }
         Geometry::Rigid(rigid) => {
-            let turned = rigid.pose.rotation.to_array();
-            let moved = rigid.pose.translation.to_array().into_iter();
-            for value in moved.chain(turned).chain(rigid.velocity.to_array()) {
-                write(&mut hasher, value.to_bits());
-            }
+            write_motion(&mut hasher, &rigid.pose, rigid.velocity);
+        }
+        Geometry::Volume(volume) => {
+            volume.dims().into_iter().for_each(|dim| write(&mut hasher, dim));
+            hasher.write(&volume.digest().to_le_bytes());
+            write_motion(&mut hasher, &volume.pose, volume.velocity);
         }
     }
     object.behavior.hash_state(&mut hasher);
     hasher.finish()
+}
+
+fn write_motion(hasher: &mut FnvHasher, pose: &Pose, velocity: Vec3) {
+    let turned = pose.rotation.to_array();
+    let moved = pose.translation.to_array().into_iter();
+    for value in moved.chain(turned).chain(velocity.to_array()) {
+        write(hasher, value.to_bits());
+    }
 }
 
 fn write_vectors(hasher: &mut FnvHasher, vectors: &Vectors) {
@@ -77,8 +88,6 @@ fn write(hasher: &mut FnvHasher, value: u32) {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
-
     use super::*;
     use crate::scene::ParticleScene;
 

@@ -197,6 +197,7 @@ fn energy_of_contacts(executor: &SerialExecutor) -> f64 {
     executor.visit(&mut |object| match &object.geometry {
         Geometry::Mesh(mesh) => meshes.push(mesh.clone()),
         Geometry::Rigid(rigid) => walls.extend(rigid.plane()),
+        Geometry::Volume(_) => {}
     });
     // The scene's stiffnesses and reaches: node and wall, node and node, core and core.
     let stored = |stiffness: f64, reach: f64, distance: f32| {

@@ -7,6 +7,7 @@ pub mod body;
 pub mod checker;
 pub mod drive;
 pub mod host;
+#[cfg(feature = "sim")]
 pub mod program;
 pub mod random_ve;
 pub mod reference;

@@ -15,7 +15,9 @@ pub fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
         let built = Command::new(env!("CARGO"))
-            .args(["build", "--quiet", "-p", "dualframe-render-wgpu", "--bin", "dualframe"])
+            .args(["build", "--quiet", "--bin", "dualframe", "-p", "dualframe-render-wgpu"])
+            // With the features that the tests ask of libraries: nothing is built twice.
+            .args(["-p", "dualframe-tests"])
             .args(["--message-format", "json-render-diagnostics"])
             .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
             .output()

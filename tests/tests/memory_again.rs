@@ -100,8 +100,11 @@ impl Owned {
             let mut worker = pipeline.worker();
             let token = pipeline.token(()).expect("there is a token");
             assert!(worker.hold(token).is_ok());
+            let mut steps = 0;
             while !pipeline.finished() {
                 worker.step(&crowd).expect("no callback fails");
+                steps += 1;
+                assert!(steps < 100_000, "no progress");
             }
         }
         crowd.interactions.load(SeqCst)

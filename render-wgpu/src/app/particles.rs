@@ -18,14 +18,16 @@ use super::AllocationCounter;
 use super::args::Particles;
 use super::measure::Measure;
 use super::outputs::{self, Outputs};
-use super::pictures::{self, Pictures};
+use super::pictures::Pictures;
 use super::report::{FrameMilliseconds, Report};
-use super::window::Session;
+use super::window::{Session, most_threads};
 
 /// Frames that are run serially too, to say what the speed-up is.
 const REFERENCE_FRAMES: u64 = 48;
-/// Spans of a worker that its timeline keeps; usually 65,536, some seconds of work.
-const KEPT_SPANS: usize = 1 << 16;
+/// Spans of a worker that its timeline keeps for a trace; usually 65,536, some seconds of work.
+const TRACED_SPANS: usize = 1 << 16;
+/// Spans of a worker that its timeline keeps for a window; usually 4,096, more than is shown.
+const SHOWN_SPANS: usize = 1 << 12;
 
 /// Why a run failed.
 #[derive(Debug, Error)]
@@ -71,7 +73,10 @@ pub(super) fn run(
     note: &dyn Fn(&str),
 ) -> Result<Report, RunError> {
     let settings = settings_of(args, args.executor, args.threads, args.entry());
-    let timeline = Arc::new(Timeline::new(args.threads + 1, KEPT_SPANS));
+    let spans = if args.trace.is_some() { TRACED_SPANS } else { SHOWN_SPANS };
+    // One more for whoever renders beside rayon's workers.
+    let workers = args.threads.max(most_threads()) + 1;
+    let timeline = Arc::new(Timeline::new(workers, spans));
     let window = open_window(args, &timeline, note)?;
     let mut manager = VeManager::new(build(args)?, settings)?;
     if window.is_some() || outputs.trace.is_some() {
@@ -81,11 +86,9 @@ pub(super) fn run(
         Some(window) => {
             let mut measure = Measure::new(args.frames, count);
             measure.start();
+            let picture = outputs.picture.as_ref();
             let on_frame = &mut |record: &FrameRecord| measure.frame(record);
-            let (manager, look, camera) = window.run(manager, args.frames, on_frame)?;
-            if let Some(file) = &outputs.picture {
-                pictures::save(args, &manager, look, camera, file)?;
-            }
+            let manager = window.run(manager, args.frames, picture, on_frame)?;
             report(args, &manager, &measure, None)
         }
         None => run_unwatched(args, outputs, manager, settings, count)?,

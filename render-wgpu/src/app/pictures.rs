@@ -6,17 +6,14 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
-use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::error::GraphicsError;
 use dualframe_render_wgpu::gpu::Gpu;
 use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_render_wgpu::picture::Picture;
 use dualframe_render_wgpu::renderer::Offscreen;
 use dualframe_sim::geometry::Bounds;
-use dualframe_sim::manager::VeManager;
 use dualframe_sim::object::Object;
 use dualframe_sim::render::Renderer;
-use dualframe_sim::stages;
 
 use super::args::Particles;
 use super::outputs;
@@ -99,30 +96,14 @@ impl Renderer for Pictures {
     }
 }
 
-fn write(picture: &Picture, file: &File) -> Result<(), RunError> {
+/// Writes a picture to a file of the outputs.
+pub(super) fn write(picture: &Picture, file: &File) -> Result<(), RunError> {
     outputs::replace(file, |writer| picture.write_png(writer)).map_err(RunError::Picture)
 }
 
 /// The file in `folder` that gets a frame's picture.
 pub(super) fn file_of_frame(folder: &Path, frame: u64) -> PathBuf {
     folder.join(format!("frame-{frame:06}.png"))
-}
-
-/// Writes a picture of an environment as it is, as a window showed it.
-pub(super) fn save(
-    args: &Particles,
-    manager: &VeManager,
-    look: Look,
-    camera: Camera,
-    file: &File,
-) -> Result<(), RunError> {
-    let gpu = Gpu::new(args.adapter.as_deref())?;
-    let look = Look { quality: Quality::Fine, ..look };
-    let mut offscreen = Offscreen::new(gpu, look, args.size)?;
-    offscreen.painter.camera = camera;
-    manager.visit(&mut |object| stages::draw(object, &mut offscreen));
-    offscreen.swap(0);
-    write(&offscreen.picture()?, file)
 }
 
 /// Pictures on their way to files, written by a thread of their own.

@@ -92,3 +92,31 @@ fn shade(position: vec3f, normal: vec3f, albedo: vec3f, gloss: f32) -> vec3f {
     let direct = SUN * facing * reach.x;
     return tone(0.62 * (albedo * (sky + direct * 0.62) + direct * glint + sky * rim));
 }
+
+struct BoxCorner {
+    // From 0 to 1 along each axis.
+    share: vec3f,
+    // Of its side, inwards.
+    normal: vec3f,
+}
+
+// A corner of the sides of a box, which are counter-clockwise as seen from inside.
+fn corner_of_box(index: u32) -> BoxCorner {
+    // Six sides of six corners: axis and sign of the side, then the corner on it.
+    let side = index / 6u;
+    let axis = side / 2u;
+    let high = side % 2u == 1u;
+    var corners = array(vec2f(0.0, 0.0), vec2f(1.0, 0.0), vec2f(1.0, 1.0),
+                        vec2f(0.0, 0.0), vec2f(1.0, 1.0), vec2f(0.0, 1.0));
+    var corner = corners[index % 6u];
+    if high {
+        corner = corner.yx;
+    }
+    var share = vec3f(0.0);
+    share[axis] = select(0.0, 1.0, high);
+    share[(axis + 1u) % 3u] = corner.x;
+    share[(axis + 2u) % 3u] = corner.y;
+    var normal = vec3f(0.0);
+    normal[axis] = select(1.0, -1.0, high);
+    return BoxCorner(share, normal);
+}

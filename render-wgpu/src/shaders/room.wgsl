@@ -8,25 +8,9 @@ struct Wall {
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> Wall {
-    // Six sides of six corners: axis and sign of the side, then the corner on it.
-    let side = index / 6u;
-    let axis = side / 2u;
-    let high = side % 2u == 1u;
-    var corners = array(vec2f(0.0, 0.0), vec2f(1.0, 0.0), vec2f(1.0, 1.0),
-                        vec2f(0.0, 0.0), vec2f(1.0, 1.0), vec2f(0.0, 1.0));
-    var corner = corners[index % 6u];
-    if high {
-        // Counter-clockwise as seen from inside.
-        corner = corner.yx;
-    }
-    var share = vec3f(0.0);
-    share[axis] = select(0.0, 1.0, high);
-    share[(axis + 1u) % 3u] = corner.x;
-    share[(axis + 2u) % 3u] = corner.y;
-    var normal = vec3f(0.0);
-    normal[axis] = select(1.0, -1.0, high);
-    let position = mix(globals.room_min, globals.room_max, share);
-    return Wall(globals.view_projection * vec4f(position, 1.0), position, normal);
+    let corner = corner_of_box(index);
+    let position = mix(globals.room_min, globals.room_max, corner.share);
+    return Wall(globals.view_projection * vec4f(position, 1.0), position, corner.normal);
 }
 
 // How much a line of a grid of half a metre covers of a pixel.

@@ -4,6 +4,7 @@
 //! copy. Vertices fetch them by number and make their normals from their neighbours, so that updates
 //! have nothing to write for the renderer.
 
+mod frame_buffer;
 mod layouts;
 mod make;
 mod pipelines;
@@ -11,13 +12,13 @@ mod pipelines;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use bytemuck::Pod;
 use dualframe_sim::geometry::{Mesh, Rigid, Vectors};
 use dualframe_sim::object::{Drawing, Object};
-use wgpu::{
-    BindGroup, Buffer, BufferDescriptor, BufferUsages, Device, Queue, RenderPass, RenderPipeline,
-};
+use parry3d::shape::SharedShape;
+use wgpu::{BindGroup, Buffer, BufferSlice, Device, Queue, RenderPass, RenderPipeline};
 
+use self::frame_buffer::FrameBuffer;
+pub(crate) use self::frame_buffer::GLOBALS;
 pub(crate) use self::layouts::Layouts;
 pub(crate) use self::make::Instance;
 use self::make::{Indices, Make};
@@ -29,7 +30,7 @@ use crate::target::Format;
 
 /// Frames after which what is no longer drawn is forgotten: surfaces that are cut get a new make with
 /// every cut.
-const KEPT_FRAMES: u64 = 600;
+pub(crate) const KEPT_FRAMES: u64 = 600;
 
 /// The surfaces of a frame.
 pub(crate) struct Surfaces {
@@ -37,22 +38,23 @@ pub(crate) struct Surfaces {
     makes: Vec<Make>,
     /// The makes by where their likeness is in memory; `None` for shapes that have no surface.
     by_address: HashMap<usize, Option<usize>>,
-    numbers: List<f32>,
-    instances: List<Instance>,
-    bound_numbers: BindGroup,
+    /// Those shapes, kept so that their addresses stay their own.
+    without_surface: Vec<SharedShape>,
+    sent: FrameBuffer,
+    /// Where in it the instances begin, in bytes.
+    instances: usize,
     frame: u64,
 }
 
 impl Surfaces {
     pub(crate) fn new(device: &Device, layouts: &Layouts, format: Format) -> Self {
-        let numbers = List::new(device, "numbers", BufferUsages::STORAGE);
         Self {
             pipelines: Pipelines::new(device, layouts, format),
             makes: Vec::new(),
             by_address: HashMap::new(),
-            bound_numbers: layouts.list(device, &numbers.buffer),
-            numbers,
-            instances: List::new(device, "instances", BufferUsages::VERTEX),
+            without_surface: Vec::new(),
+            sent: FrameBuffer::new(device, layouts),
+            instances: 0,
             frame: 0,
         }
     }
@@ -60,7 +62,7 @@ impl Surfaces {
     /// Forgets the last frame's bodies.
     pub(crate) fn clear(&mut self) {
         self.frame += 1;
-        self.numbers.staged.clear();
+        self.sent.clear();
         for make in &mut self.makes {
             make.surfaces.clear();
             make.wires.clear();
@@ -70,6 +72,7 @@ impl Surfaces {
             self.makes.retain(|make| make.used >= oldest);
             // Found again at their next drawing.
             self.by_address.clear();
+            self.without_surface.clear();
             let addresses = self.makes.iter().map(Make::address).enumerate();
             self.by_address.extend(addresses.map(|(index, address)| (address, Some(index))));
         }
@@ -91,7 +94,7 @@ impl Surfaces {
         let address = Arc::as_ptr(topology).addr();
         let make = self.make(address, || Some(Make::deformable(device, layouts, topology)));
         let Some(make) = make else { return };
-        let first = self.numbers.staged.len() as u32;
+        let first = self.sent.words.len() as u32;
         self.stage(&mesh.positions);
         if coloring == Coloring::Speed {
             self.stage(&mesh.velocities);
@@ -108,8 +111,14 @@ impl Surfaces {
         rigid: &Rigid,
     ) {
         let address = Arc::as_ptr(&rigid.shape.0).addr();
+        let is_new = !self.by_address.contains_key(&address);
         let make = self.make(address, || Make::rigid(device, layouts, &rigid.shape));
-        let Some(make) = make else { return };
+        let Some(make) = make else {
+            if is_new {
+                self.without_surface.push(rigid.shape.clone());
+            }
+            return;
+        };
         let (turned, place) = (rigid.pose.rotation.to_array(), rigid.pose.translation.to_array());
         self.add(make, object, 0, turned, place);
     }
@@ -126,7 +135,7 @@ impl Surfaces {
 
     fn stage(&mut self, vectors: &Vectors) {
         for component in vectors.as_slices() {
-            self.numbers.staged.extend_from_slice(component);
+            self.sent.words.extend_from_slice(component);
         }
     }
 
@@ -148,26 +157,28 @@ impl Surfaces {
         }
     }
 
-    /// Sends this frame's bodies to the device.
+    /// Sends the frame's numbers and bodies to the device; says whether the buffer is a new one.
     ///
     /// # Errors
     /// More than the device's buffers hold.
     pub(crate) fn upload(
         &mut self,
-        device: &Device,
-        queue: &Queue,
+        (device, queue): (&Device, &Queue),
         layouts: &Layouts,
-    ) -> Result<(), GraphicsError> {
-        self.instances.staged.clear();
+        numbers: &[f32],
+    ) -> Result<bool, GraphicsError> {
+        self.instances = size_of_val(self.sent.words.as_slice());
         for make in &self.makes {
-            self.instances.staged.extend_from_slice(&make.surfaces);
-            self.instances.staged.extend_from_slice(&make.wires);
+            for list in [&make.surfaces, &make.wires] {
+                self.sent.words.extend_from_slice(bytemuck::cast_slice(list));
+            }
         }
-        if self.numbers.upload(device, queue)? {
-            self.bound_numbers = layouts.list(device, &self.numbers.buffer);
-        }
-        self.instances.upload(device, queue)?;
-        Ok(())
+        self.sent.upload((device, queue), layouts, numbers)
+    }
+
+    /// The buffer that begins with the frame's numbers.
+    pub(crate) fn buffer(&self) -> &Buffer {
+        &self.sent.buffer
     }
 
     /// Draws the bodies' shadows into a shadow map.
@@ -212,7 +223,7 @@ impl Surfaces {
         let bodies = self.makes.iter().flat_map(|make| &make.surfaces);
         let body = bodies.into_iter().find(|body| body.object == object)?;
         let (first, nodes) = (body.first as usize, body.nodes as usize);
-        let all = self.numbers.staged.get(first..first + 3 * nodes)?;
+        let all = self.sent.words.get(first..first + 3 * nodes)?;
         let (x, rest) = all.split_at(nodes);
         let (y, z) = rest.split_at(nodes);
         Some((body, [x, y, z]))
@@ -225,17 +236,18 @@ impl Surfaces {
 
     /// Bodies that are drawn by one call.
     fn each<'a>(&'a self, mut draw: impl FnMut(Batch<'a>)) {
-        let mut first = 0;
+        let mut first = self.instances;
         for make in &self.makes {
-            let numbers = make.own_numbers.as_ref().unwrap_or(&self.bound_numbers);
+            let numbers = make.own_numbers.as_ref().unwrap_or(&self.sent.list);
             let lists = [(&make.surfaces, &make.triangles), (&make.wires, &make.edges)];
             for (are_wires, (list, indices)) in [false, true].into_iter().zip(lists) {
+                let end = first + size_of_val(list.as_slice());
                 if !list.is_empty() {
-                    let instances = &self.instances.buffer;
-                    let count = list.len();
-                    draw(Batch { make, numbers, indices, instances, first, count, are_wires });
+                    let instances = self.sent.buffer.slice(first as u64..end as u64);
+                    let count = list.len() as u32;
+                    draw(Batch { make, numbers, indices, instances, count, are_wires });
                 }
-                first += list.len();
+                first = end;
             }
         }
     }
@@ -246,64 +258,15 @@ struct Batch<'a> {
     make: &'a Make,
     numbers: &'a BindGroup,
     indices: &'a Indices,
-    instances: &'a Buffer,
-    first: usize,
-    count: usize,
+    instances: BufferSlice<'a>,
+    count: u32,
     are_wires: bool,
 }
 
 impl Batch<'_> {
     fn draw(&self, pass: &mut RenderPass<'_>) {
-        let size = size_of::<Instance>();
-        let (begin, end) = (self.first * size, (self.first + self.count) * size);
-        pass.set_vertex_buffer(0, self.instances.slice(begin as u64..end as u64));
+        pass.set_vertex_buffer(0, self.instances);
         pass.set_index_buffer(self.indices.buffer.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..self.indices.count, 0, 0..self.count as u32);
-    }
-}
-
-/// A list that is sent anew every frame.
-struct List<T> {
-    staged: Vec<T>,
-    buffer: Buffer,
-    usage: BufferUsages,
-    label: &'static str,
-}
-
-impl<T: Pod> List<T> {
-    /// A storage buffer may not be empty.
-    const LEAST: u64 = 4_096;
-
-    fn new(device: &Device, label: &'static str, usage: BufferUsages) -> Self {
-        let buffer = Self::buffer(device, label, usage, Self::LEAST);
-        Self { staged: Vec::new(), buffer, usage, label }
-    }
-
-    fn buffer(device: &Device, label: &str, usage: BufferUsages, size: u64) -> Buffer {
-        device.create_buffer(&BufferDescriptor {
-            label: Some(label),
-            size,
-            usage: usage | BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        })
-    }
-
-    /// Sends the list; says whether the buffer is a new one.
-    fn upload(&mut self, device: &Device, queue: &Queue) -> Result<bool, GraphicsError> {
-        let bytes: &[u8] = bytemuck::cast_slice(&self.staged);
-        let (needed, limits) = (bytes.len() as u64, device.limits());
-        let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
-        if needed > most {
-            return Err(GraphicsError::Frame { needed, most });
-        }
-        let grows = needed > self.buffer.size();
-        if grows {
-            let size = needed.next_power_of_two().min(most);
-            self.buffer = Self::buffer(device, self.label, self.usage, size);
-        }
-        if !bytes.is_empty() {
-            queue.write_buffer(&self.buffer, 0, bytes);
-        }
-        Ok(grows)
+        pass.draw_indexed(0..self.indices.count, 0, 0..self.count);
     }
 }

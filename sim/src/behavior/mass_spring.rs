@@ -159,10 +159,8 @@ impl Behavior for MassSpring {
                     }
                 }
             }
-            Message::Damping(damping) => {
-                if check("the damping", damping).is_ok() {
-                    self.damping = damping;
-                }
+            Message::Damping(damping) if check("the damping", damping).is_ok() => {
+                self.damping = damping;
             }
             Message::Pull { node, target, stiffness } => {
                 self.pull = Pull::new(node, target, stiffness).or(self.pull);

@@ -14,7 +14,7 @@ pub struct Keyframe {
     pub frame: u64,
     /// Where it is, in metres.
     pub position: Vec3,
-    /// How it is turned, a unit quaternion. Only rigid shapes are turned.
+    /// How it is turned, a unit quaternion. Surfaces are not turned.
     pub rotation: Quat,
 }
 
@@ -93,6 +93,10 @@ impl Behavior for Scripted {
             Geometry::Rigid(rigid) => {
                 rigid.pose = here;
                 rigid.velocity = velocity;
+            }
+            Geometry::Volume(volume) => {
+                volume.pose = here;
+                volume.velocity = velocity;
             }
             Geometry::Mesh(mesh) => {
                 let nodes = mesh.positions.len();

@@ -71,9 +71,12 @@ impl Outside {
         &self.mailbox
     }
 
-    /// A run begins: what was posted since the last one comes into its first frame.
+    /// A run begins: what was posted since the last one comes into its first frame, or into its second
+    /// if what was posted before still waits for that: nothing is overtaken.
     pub(super) fn begin(&self, first: u64) {
-        self.take(first);
+        let second = first + 1;
+        let waits = self.slot(second).frame.load(Ordering::Relaxed) == second;
+        self.take(if waits { second } else { first });
     }
 
     /// A frame is swapped, and everybody told.

@@ -235,6 +235,7 @@ impl Shared {
     }
 
     fn time(&self, worker: usize, stage: Stage) -> Timer<'_> {
+        // Relaxed: the barrier lies between.
         self.clocks[worker].time(stage, self.frame.load(Ordering::Relaxed))
     }
 

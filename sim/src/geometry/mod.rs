@@ -6,6 +6,7 @@ mod mesh;
 mod rigid;
 mod topology;
 mod vectors;
+mod volume;
 
 use glam::Vec3;
 
@@ -17,6 +18,7 @@ pub use rigid::Rigid;
 pub(crate) use topology::Slot;
 pub use topology::{Spring, Topology, TopologyError, edges};
 pub use vectors::{LANES, Lanes, Vectors};
+pub use volume::{BRICK_SIDE, BRICK_VOXELS, Brick, Volume, VolumeError, Voxel};
 
 /// An object's shape and place.
 #[derive(Clone)]
@@ -25,6 +27,8 @@ pub enum Geometry {
     Mesh(Mesh),
     /// A rigid shape with a pose.
     Rigid(Rigid),
+    /// Voxel bone.
+    Volume(Volume),
 }
 
 impl Geometry {
@@ -33,7 +37,7 @@ impl Geometry {
     pub fn as_mesh(&self) -> Option<&Mesh> {
         match self {
             Self::Mesh(mesh) => Some(mesh),
-            Self::Rigid(_) => None,
+            Self::Rigid(_) | Self::Volume(_) => None,
         }
     }
 
@@ -41,7 +45,7 @@ impl Geometry {
     pub fn as_mesh_mut(&mut self) -> Option<&mut Mesh> {
         match self {
             Self::Mesh(mesh) => Some(mesh),
-            Self::Rigid(_) => None,
+            Self::Rigid(_) | Self::Volume(_) => None,
         }
     }
 
@@ -50,16 +54,35 @@ impl Geometry {
     pub fn as_rigid(&self) -> Option<&Rigid> {
         match self {
             Self::Rigid(rigid) => Some(rigid),
-            Self::Mesh(_) => None,
+            Self::Mesh(_) | Self::Volume(_) => None,
         }
     }
 
-    /// The middle of it, in metres: the mean of a surface's nodes, a rigid shape's origin.
+    /// The voxel bone, if it is that.
+    #[must_use]
+    pub fn as_volume(&self) -> Option<&Volume> {
+        match self {
+            Self::Volume(volume) => Some(volume),
+            Self::Mesh(_) | Self::Rigid(_) => None,
+        }
+    }
+
+    /// The voxel bone, to change it, if it is that.
+    pub fn as_volume_mut(&mut self) -> Option<&mut Volume> {
+        match self {
+            Self::Volume(volume) => Some(volume),
+            Self::Mesh(_) | Self::Rigid(_) => None,
+        }
+    }
+
+    /// The middle of it, in metres: the mean of a surface's nodes, a rigid shape's origin, a
+    /// volume's middle.
     #[must_use]
     pub fn center(&self) -> Vec3 {
         match self {
             Self::Mesh(mesh) => mesh.center(),
             Self::Rigid(rigid) => rigid.pose.translation,
+            Self::Volume(volume) => volume.center(),
         }
     }
 
@@ -69,6 +92,7 @@ impl Geometry {
         match self {
             Self::Mesh(mesh) => mesh.bounds(),
             Self::Rigid(rigid) => rigid.bounds(),
+            Self::Volume(volume) => volume.bounds(),
         }
     }
 
@@ -78,6 +102,7 @@ impl Geometry {
         match self {
             Self::Mesh(mesh) => mesh.is_finite(),
             Self::Rigid(rigid) => rigid.is_finite(),
+            Self::Volume(volume) => volume.is_finite(),
         }
     }
 }

@@ -107,6 +107,7 @@ fn velocity(object: &Object, node: u32) -> Vec3 {
     match &object.geometry {
         Geometry::Mesh(mesh) => mesh.velocities.get(node as usize).unwrap_or(Vec3::ZERO),
         Geometry::Rigid(rigid) => rigid.velocity,
+        Geometry::Volume(volume) => volume.velocity,
     }
 }
 

@@ -229,6 +229,7 @@ impl Object {
         snapshot.drawing = self.drawing;
         match (&self.geometry, &mut snapshot.geometry) {
             (Geometry::Mesh(from), Geometry::Mesh(to)) => to.copy_from(from),
+            (Geometry::Volume(from), Geometry::Volume(to)) => to.copy_from(from),
             (from, to) => to.clone_from(from),
         }
     }

@@ -1,5 +1,6 @@
 //! Environments ready to run.
 
+mod bone;
 mod particles;
 mod random;
 
@@ -8,6 +9,7 @@ use crate::message::Letter;
 use crate::object::Object;
 use crate::stages::Stages;
 
+pub use bone::{bone_piece, drill_burr_hole};
 pub use particles::{ParticleScene, SceneError};
 
 /// An environment between two frames: at its start, or taken out of an executor.

@@ -1,5 +1,7 @@
 //! Random numbers with the same bits everywhere.
 
+use crate::mix::mix;
+
 /// SplitMix64 (Steele, Lea and Flood 2014): small, portable, good enough to scatter particles.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SplitMix64(u64);
@@ -11,9 +13,7 @@ impl SplitMix64 {
 
     fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        mix(self.0)
     }
 
     /// Uniform in [−1, 1), in steps that f32 holds exactly.

@@ -1,9 +1,15 @@
 //! What the person at the window can change.
 
 use dualframe_render_wgpu::look::Coloring;
-use dualframe_sim::executor::{Entry, ExecutorKind};
+use dualframe_sim::executor::{Entry, ExecutorKind, MAX_THREADS};
+use dualframe_sim::pool::cores;
 
 use crate::app::args::Particles;
+
+/// The most workers that can be asked for at the window: more than anybody has use for.
+pub(in crate::app) fn most_threads() -> usize {
+    MAX_THREADS.min(4 * cores())
+}
 
 /// What the person at the window can change. The overlay writes it; between two runs of frames the
 /// session does what is new in it.

@@ -44,8 +44,6 @@ pub(super) struct Input {
     /// Why there is no window.
     pub(super) failure: Option<String>,
     pub(super) is_closing: bool,
-    /// Something may have to be drawn anew.
-    pub(super) has_changed: bool,
     /// What was done and not yet looked at.
     pub(super) gestures: Vec<Gesture>,
     /// Where the mouse is, in pixels from the upper left.
@@ -62,7 +60,6 @@ impl Input {
             egui: None,
             failure: None,
             is_closing: false,
-            has_changed: false,
             gestures: Vec::new(),
             cursor: Vec2::ZERO,
             held: None,
@@ -112,7 +109,6 @@ impl ApplicationHandler for Input {
 
     fn window_event(&mut self, _: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         let Some(window) = &self.window else { return };
-        self.has_changed = true;
         let is_taken = self.egui.as_mut().is_some_and(|egui| {
             let response = egui.on_window_event(window, &event);
             response.consumed
@@ -125,10 +121,10 @@ impl ApplicationHandler for Input {
                 // What began outside the overlay stays outside it.
                 self.gestures.extend(self.held.map(|button| Gesture::Drag(button, moved)));
             }
-            WindowEvent::MouseInput { state, button, .. } => {
-                if !is_taken || state == ElementState::Released {
-                    self.press(state, button);
-                }
+            WindowEvent::MouseInput { state, button, .. }
+                if !is_taken || state == ElementState::Released =>
+            {
+                self.press(state, button);
             }
             WindowEvent::MouseWheel { delta, .. } if !is_taken => {
                 self.gestures.push(Gesture::Wheel(match delta {

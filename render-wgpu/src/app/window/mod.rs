@@ -14,25 +14,27 @@ mod stats;
 mod surface;
 mod view;
 
+use std::fs::File;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
-use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::error::GraphicsError;
-use dualframe_render_wgpu::look::Look;
 use dualframe_sim::executor::{ExecutorError, ExecutorKind, FrameRecord};
 use dualframe_sim::manager::VeManager;
 use dualframe_sim::message::Message;
 use dualframe_sim::object::ObjectId;
 use dualframe_sim::scene::{ParticleScene, Scene};
+use dualframe_sim::stages;
 use dualframe_sim::timeline::Timeline;
 use glam::Vec3;
 
 use self::controls::Controls;
+pub(super) use self::controls::most_threads;
 use self::view::{Shown, View};
 use crate::app::args::Particles;
 use crate::app::particles::{self, RunError};
+use crate::app::pictures;
 
 /// How long a run of frames takes, about; usually 50 ms: so late may controls take effect.
 const RUN_SECONDS: f32 = 0.05;
@@ -76,7 +78,7 @@ impl<'a> Session<'a> {
     }
 
     /// Runs the environment until the window is closed, or so many frames are done; gives back the
-    /// environment as it is then, and how it was looked at.
+    /// environment as it is then.
     ///
     /// # Errors
     /// The executor cannot go on, or the window can no longer be drawn to.
@@ -84,8 +86,9 @@ impl<'a> Session<'a> {
         mut self,
         mut manager: VeManager,
         frames: Option<u64>,
+        picture: Option<&File>,
         on_frame: &mut dyn FnMut(&FrameRecord),
-    ) -> Result<(VeManager, Look, Camera), RunError> {
+    ) -> Result<VeManager, RunError> {
         self.view.turn_to(self.view.painter.look.focus, manager.mailbox());
         let mut left = frames.unwrap_or(u64::MAX);
         while left > 0 && !self.view.is_closing() {
@@ -103,10 +106,14 @@ impl<'a> Session<'a> {
             self.advance(&mut manager, count, on_frame)?;
             left -= count;
         }
-        match self.view.failure() {
-            Some(failure) => Err(failure.into()),
-            None => Ok((manager, self.view.painter.look, self.view.painter.camera)),
+        if let Some(failure) = self.view.failure() {
+            return Err(failure.into());
         }
+        if let Some(file) = picture {
+            self.take(&manager);
+            pictures::write(&self.view.picture()?, file)?;
+        }
+        Ok(manager)
     }
 
     fn frames_of_a_run(&self) -> u64 {
@@ -127,10 +134,15 @@ impl<'a> Session<'a> {
         })
     }
 
+    /// Takes all objects as they are, to be drawn.
+    fn take(&mut self, manager: &VeManager) {
+        self.view.show_next();
+        manager.visit(&mut |object| stages::draw(object, &mut self.view));
+    }
+
     /// Shows the environment as it is.
     fn stand_still(&mut self, manager: &VeManager) {
-        self.view.show_next();
-        manager.visit(&mut |object| dualframe_sim::stages::draw(object, &mut self.view));
+        self.take(manager);
         self.view.redraw();
         self.view.attend(IDLE);
         self.view.interrupt();

@@ -3,13 +3,13 @@
 use std::time::Duration;
 
 use dualframe_render_wgpu::look::Coloring;
-use dualframe_sim::executor::{ExecutorKind, MAX_THREADS};
+use dualframe_sim::executor::ExecutorKind;
 use dualframe_sim::scene::ParticleScene;
 use dualframe_sim::timeline::{Span, Timeline};
 use egui::{Checkbox, ComboBox, DragValue, Grid, Slider, Ui};
 
 use super::charts;
-use super::controls::Controls;
+use super::controls::{Controls, most_threads};
 use super::stats::Stats;
 
 /// How far back the timeline goes; usually 50 ms, some ten frames.
@@ -125,7 +125,7 @@ fn executor_controls(ui: &mut Ui, controls: &mut Controls) {
         );
         ui.end_row();
         ui.label("workers");
-        let most = MAX_THREADS.min(4 * dualframe_sim::pool::cores());
+        let most = most_threads().max(controls.threads);
         ui.add(Slider::new(&mut controls.threads, 1..=most));
         ui.end_row();
         ui.label("frames in flight");

@@ -10,6 +10,7 @@ use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::error::GraphicsError;
 use dualframe_render_wgpu::gpu::Gpu;
 use dualframe_render_wgpu::look::{Look, Quality};
+use dualframe_render_wgpu::picture::{Picture, read_texture};
 use dualframe_render_wgpu::renderer::Painter;
 use dualframe_sim::geometry::Bounds;
 use dualframe_sim::mailbox::Mailbox;
@@ -17,7 +18,10 @@ use dualframe_sim::object::Object;
 use dualframe_sim::render::Renderer;
 use dualframe_sim::timeline::Timeline;
 use glam::Vec2;
-use wgpu::{Instance, InstanceDescriptor};
+use wgpu::{
+    CommandBuffer, Extent3d, Instance, InstanceDescriptor, Texture, TextureDescriptor,
+    TextureDimension, TextureUsages,
+};
 use winit::event_loop::EventLoop;
 use winit::platform::pump_events::EventLoopExtPumpEvents;
 use winit::window::Window;
@@ -153,9 +157,8 @@ impl View {
         self.hand = Hand::new();
     }
 
-    /// Does what the person did, after waiting for it for up to `timeout`; says whether anything may look
-    /// different now.
-    pub(super) fn attend(&mut self, timeout: Duration) -> bool {
+    /// Does what the person did, after waiting for it for up to `timeout`.
+    pub(super) fn attend(&mut self, timeout: Duration) {
         self.event_loop.pump_app_events(Some(timeout), &mut self.input);
         let mut gestures = std::mem::take(&mut self.input.gestures);
         for gesture in gestures.drain(..) {
@@ -172,7 +175,6 @@ impl View {
             }
         }
         self.painter.look.coloring = self.controls.coloring;
-        std::mem::take(&mut self.input.has_changed)
     }
 
     fn act(&mut self, gesture: Gesture) {
@@ -230,25 +232,50 @@ impl View {
             self.painter.discard();
             return Ok(());
         };
-        let picture = texture.texture.create_view(&Default::default());
-        let mut encoder = self.painter.gpu().device.create_command_encoder(&Default::default());
-        self.painter.paint(&mut encoder, &picture);
-        let Self { painter, overlay_painter, overlay, input, controls, stats, timeline, .. } = self;
-        let gpu = painter.gpu();
-        let mut commands = match &mut input.egui {
-            Some(egui) => {
-                overlay_painter.paint(gpu, (&self.window, egui), (&mut encoder, &picture), |ui| {
-                    overlay.show(ui, controls, &stats.borrow(), timeline)
-                })
-            }
-            None => Vec::new(),
-        };
-        commands.push(encoder.finish());
+        let commands = self.encode(&texture.texture);
+        let gpu = self.painter.gpu();
         gpu.queue.submit(commands);
         self.window.pre_present_notify();
         gpu.queue.present(texture);
         self.pace.shown(gpu, begun);
         Ok(())
+    }
+
+    /// Encodes how what was taken, and the overlay, is drawn to a texture of the window's format and size.
+    fn encode(&mut self, texture: &Texture) -> Vec<CommandBuffer> {
+        let picture = texture.create_view(&Default::default());
+        let mut encoder = self.painter.gpu().device.create_command_encoder(&Default::default());
+        self.painter.paint(&mut encoder, &picture);
+        let Self { painter, overlay_painter, overlay, input, controls, stats, timeline, .. } = self;
+        let mut commands = match &mut input.egui {
+            Some(egui) => overlay_painter.paint(
+                painter.gpu(),
+                (&self.window, egui),
+                (&mut encoder, &picture),
+                |ui| overlay.show(ui, controls, &stats.borrow(), timeline),
+            ),
+            None => Vec::new(),
+        };
+        commands.push(encoder.finish());
+        commands
+    }
+
+    /// What the window shows of what was taken.
+    pub(super) fn picture(&mut self) -> Result<Picture, GraphicsError> {
+        let (width, height) = self.painter.size();
+        let texture = self.painter.gpu().device.create_texture(&TextureDescriptor {
+            label: Some("picture of the window"),
+            size: Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: TextureDimension::D2,
+            format: self.screen.format(),
+            usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let commands = self.encode(&texture);
+        self.painter.gpu().queue.submit(commands);
+        read_texture(self.painter.gpu(), &texture)
     }
 
     /// Draws what was taken.

@@ -1,0 +1,122 @@
+//! Volumes out.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+
+use super::header::{Header, MAGIC, MILLIMETRES, SIZEOF_HDR, VOX_OFFSET, at};
+use crate::image::error::{FileError, ImageError};
+use crate::image::grid::Grid;
+
+/// A value that a voxel can have in a written volume.
+pub trait Voxel: Copy + private::Bytes {}
+
+mod private {
+    pub trait Bytes {
+        const DATATYPE: i16;
+        const COUNT: usize;
+        fn put(self, row: &mut Vec<u8>);
+    }
+}
+
+macro_rules! voxel {
+    ($number:ty, $datatype:literal) => {
+        impl Voxel for $number {}
+        impl private::Bytes for $number {
+            const DATATYPE: i16 = $datatype;
+            const COUNT: usize = size_of::<Self>();
+            fn put(self, row: &mut Vec<u8>) {
+                row.extend_from_slice(&self.to_le_bytes());
+            }
+        }
+    };
+}
+
+voxel!(u8, 2);
+voxel!(i16, 4);
+voxel!(u16, 512);
+
+/// Writes a volume to a file, packed by gzip if its name ends in `.gz`; as [`write`].
+///
+/// # Errors
+/// As [`write`], or the file cannot be created.
+pub fn save<V: Voxel>(path: &Path, grid: &Grid, voxels: &[V]) -> Result<(), FileError> {
+    let save = || {
+        grid.check_length(voxels.len())?;
+        let file = BufWriter::new(File::create(path)?);
+        if path.extension().is_some_and(|extension| extension == "gz") {
+            let mut packed = GzEncoder::new(file, Compression::fast());
+            write(&mut packed, grid, voxels)?;
+            packed.finish()?.flush()?;
+        } else {
+            let mut file = file;
+            write(&mut file, grid, voxels)?;
+            file.flush()?;
+        }
+        Ok(())
+    };
+    save().map_err(|source| FileError { path: path.to_owned(), source })
+}
+
+/// Writes a volume as NIfTI-1, low bytes first and lengths in millimetres: `voxels` are the image's, x
+/// fastest, and come to stand in the order, and with the affine map, of the file that `grid` came from.
+///
+/// The map is written as the sform, in 32-bit floats: that of a NIfTI file's sform comes back exactly.
+///
+/// # Errors
+/// Another number of values than voxels; the sink's.
+pub fn write<V: Voxel>(sink: &mut impl Write, grid: &Grid, voxels: &[V]) -> Result<(), ImageError> {
+    grid.check_length(voxels.len())?;
+    sink.write_all(&header(grid, V::DATATYPE, V::COUNT))?;
+    rows(sink, grid, voxels)?;
+    Ok(())
+}
+
+fn rows<V: Voxel>(sink: &mut impl Write, grid: &Grid, voxels: &[V]) -> io::Result<()> {
+    let mut stored = Vec::new();
+    for row in grid.stored_rows() {
+        stored.clear();
+        row.places().for_each(|place| voxels[place].put(&mut stored));
+        sink.write_all(&stored)?;
+    }
+    Ok(())
+}
+
+/// The header, and the four bytes that say that it is not extended.
+fn header(grid: &Grid, datatype: i16, bytes: usize) -> [u8; VOX_OFFSET as usize] {
+    const SCANNER: i16 = 1;
+    const MILLIMETRES_PER_METRE: f64 = 1e3;
+    let mut header = [0; VOX_OFFSET as usize];
+    let mut put = |at: usize, bytes: &[u8]| header[at..at + bytes.len()].copy_from_slice(bytes);
+    put(at::SIZEOF_HDR, &SIZEOF_HDR.to_le_bytes());
+    put(at::MAGIC, &MAGIC);
+    put(at::DATATYPE, &datatype.to_le_bytes());
+    put(at::BITPIX, &(8 * bytes as i16).to_le_bytes());
+    put(at::VOX_OFFSET, &f32::from(VOX_OFFSET).to_le_bytes());
+    put(at::XYZT_UNITS, &[MILLIMETRES]);
+    put(at::SFORM_CODE, &SCANNER.to_le_bytes());
+    let sides = grid.stored_dims().map(|side| side as i16);
+    let dim = [3, sides[0], sides[1], sides[2], 1, 1, 1, 1];
+    for (number, length) in dim.into_iter().enumerate() {
+        put(at::DIM + 2 * number, &length.to_le_bytes());
+    }
+    let columns = grid.stored_affine().to_cols_array_2d();
+    let millimetres = columns.map(|column| column.map(|metres| metres * MILLIMETRES_PER_METRE));
+    for (axis, column) in millimetres.iter().enumerate() {
+        for (row, &length) in column.iter().enumerate() {
+            put(at::SROW_X + 16 * row + 4 * axis, &(length as f32).to_le_bytes());
+        }
+    }
+    put(at::PIXDIM, &1.0_f32.to_le_bytes());
+    for (axis, column) in millimetres[..3].iter().enumerate() {
+        let distance = column.iter().map(|length| length * length).sum::<f64>().sqrt();
+        put(at::PIXDIM + 4 * (axis + 1), &(distance as f32).to_le_bytes());
+    }
+    header
+}
+
+const _: () = assert!(Header::BYTES + 4 == VOX_OFFSET as usize);
+const _: () = assert!(Grid::MAX_SIDE <= i16::MAX as u32);
