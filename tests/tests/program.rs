@@ -2,59 +2,13 @@
 #![forbid(unsafe_code)]
 
 use std::path::Path;
-use std::process::{Command, Output};
-use std::sync::OnceLock;
 
-use serde_json::Value;
-
-/// The program. Cargo builds binaries only for the tests of their own package, so this builds it
-/// once, by the cargo that runs the tests.
-fn program() -> &'static Path {
-    static PROGRAM: OnceLock<std::path::PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| {
-        let built = Command::new(env!("CARGO"))
-            .args(["build", "--quiet", "-p", "dualframe-render-wgpu", "--bin", "dualframe"])
-            .args(["--message-format", "json-render-diagnostics"])
-            .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
-            .output()
-            .expect("cargo runs");
-        assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
-        let messages = String::from_utf8(built.stdout).expect("cargo speaks UTF-8");
-        let parsed = messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
-        let mut executables =
-            parsed.filter_map(|message| message["executable"].as_str().map(Into::into));
-        executables.next_back().expect("cargo names the executable")
-    })
-}
-
-/// The program where there is no display, so that no window opens.
-fn command() -> Command {
-    let mut command = Command::new(program());
-    command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
-    command
-}
-
-fn run(args: &[&str]) -> Output {
-    command().args(args).output().expect("the program starts")
-}
-
-fn report(args: &[&str]) -> Value {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let file = folder.path().join("report.json");
-    let json = file.to_str().expect("a plain path");
-    let output = run(&[args, &["--json", json]].concat());
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let text = std::fs::read_to_string(&file).expect("the report was written");
-    serde_json::from_str(&text).expect("the report is JSON")
-}
+use dualframe_tests::program::{command, report, run, told};
 
 /// Exit status 2, one line on standard error that holds `part`, nothing on standard output.
 fn refused(args: &[&str], part: &str) {
     let output = run(args);
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{args:?}: {told}");
-    assert_eq!(told.lines().count(), 1, "{args:?}: {told}");
-    assert!(told.contains(part), "{args:?}: {told}");
+    told(&output, 2, part);
     assert!(output.stdout.is_empty(), "{args:?} did some work");
 }
 
@@ -155,7 +109,38 @@ fn bad_arguments() {
     refused(&["--nonsense"], "--nonsense");
     refused(&["nonsense"], "nonsense");
     refused(&["--window", "--headless"], "--window");
+    for size in ["0x0", "640x0", "20000x20000", "640", "x", "640x480x3"] {
+        refused(&["--offscreen", "--size", size], size);
+    }
     refused(&["--json", "/no/such/folder/report.json"], "/no/such/folder/report.json");
+}
+
+#[test]
+fn bad_files() {
+    for option in ["--json", "--picture", "--trace"] {
+        refused(&[option, "/no/such/folder/file"], "/no/such/folder/file");
+        refused(&[option, "/proc"], "/proc");
+    }
+    // Nobody can make a folder or a file there.
+    refused(&["--frames-out", "/proc/pictures"], "/proc/pictures");
+    refused(&["--frames-out", "/proc"], "/proc");
+    // A run that cannot be keeps what is in a file.
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("file");
+    std::fs::write(&file, "precious").expect("it can be written");
+    let text = file.to_str().expect("a plain path");
+    refused(&["--picture", text, "--trace", "/no/such/folder/trace"], "/no/such/folder/trace");
+    refused(&["--frames-out", text], text);
+    assert_eq!(std::fs::read_to_string(&file).ok().as_deref(), Some("precious"));
+}
+
+#[test]
+fn a_pipe_is_a_file_too() {
+    let output = run(&["--headless", "--objects", "5", "--frames", "5", "--json", "/dev/stdout"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let printed = String::from_utf8(output.stdout).expect("plain text");
+    let json = printed.lines().last().map(serde_json::from_str::<serde_json::Value>);
+    assert!(json.is_some_and(|json| json.is_ok_and(|json| json["objects"] == 5)), "{printed}");
 }
 
 #[test]
@@ -194,8 +179,7 @@ fn help_states_the_limits() {
 
 #[test]
 fn a_closed_pipe_is_no_panic() {
-    let mut child = command()
-        .args(["--objects", "5", "--frames", "5"])
+    let mut child = command(&["--headless", "--objects", "5", "--frames", "5"])
         .stdout(std::process::Stdio::piped())
         .spawn()
         .expect("the program starts");

@@ -1,6 +1,5 @@
 //! `dualframe experiment`.
 
-use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -10,14 +9,13 @@ use dualframe_sim::experiment::{self, PAGE, Report};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::args::ExperimentArgs;
-use super::report;
+use super::outputs;
 
 /// Makes the folder and sees that it can be written to: an hour's run must not end in "no such
 /// folder".
 pub(super) fn prepare(out: &Path) -> Result<(), String> {
-    let made = fs::create_dir_all(out);
-    made.map_err(|error| format!("cannot make the folder {}: {error}", out.display()))?;
-    report::open(&out.join(PAGE)).map(drop)
+    outputs::make_folder(out)?;
+    outputs::open(&out.join(PAGE)).map(drop)
 }
 
 /// Runs the experiments that `args` ask for.

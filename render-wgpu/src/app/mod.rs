@@ -3,6 +3,7 @@
 mod args;
 mod experiment;
 mod measure;
+mod outputs;
 mod particles;
 mod pictures;
 mod report;
@@ -12,6 +13,7 @@ use std::error::Error;
 use std::process::ExitCode;
 
 use self::args::{ExperimentArgs, Outcome, Particles};
+use self::outputs::Outputs;
 use self::particles::RunError;
 
 /// Counts the heap allocations made so far.
@@ -45,19 +47,18 @@ fn run_experiments(args: &ExperimentArgs) -> ExitCode {
 }
 
 fn run_particles(particles: &Particles, allocations: AllocationCounter<'_>) -> ExitCode {
-    // Opened before any work is done: an hour's run must not end in "no such folder".
-    let json = match particles.json.as_deref().map(report::open).transpose() {
-        Ok(json) => json,
+    let outputs = match Outputs::open(particles) {
+        Ok(outputs) => outputs,
         Err(line) => return fail(&line, BAD_ARGUMENT),
     };
     let note = |line: &str| eprintln!("dualframe: {line}");
-    let report = match particles::run(particles, allocations, &note) {
+    let report = match particles::run(particles, &outputs, allocations, &note) {
         Ok(report) => report,
         Err(RunError::Graphics(error)) => return fail(&with_causes(&error), NO_PICTURE),
         Err(error) => return fail(&with_causes(&error), UNSOUND),
     };
     report.print();
-    if let Some(json) = json
+    if let Some(json) = &outputs.json
         && let Err(line) = report.write(json)
     {
         return fail(&line, UNSOUND);

@@ -1,6 +1,7 @@
 //! `dualframe particles`.
 
-use std::io;
+use std::fs::File;
+use std::io::{self, BufWriter};
 use std::sync::Arc;
 
 use dualframe_render_wgpu::error::GraphicsError;
@@ -16,6 +17,7 @@ use thiserror::Error;
 use super::AllocationCounter;
 use super::args::Particles;
 use super::measure::Measure;
+use super::outputs::{self, Outputs};
 use super::pictures::Pictures;
 use super::report::{FrameMilliseconds, Report};
 use super::window::{Session, most_threads};
@@ -66,6 +68,7 @@ fn build(args: &Particles) -> Result<Scene, SceneError> {
 /// Runs the environment as `args` say. `note` is told what the person at the terminal should know.
 pub(super) fn run(
     args: &Particles,
+    outputs: &Outputs,
     count: AllocationCounter<'_>,
     note: &dyn Fn(&str),
 ) -> Result<Report, RunError> {
@@ -76,20 +79,23 @@ pub(super) fn run(
     let timeline = Arc::new(Timeline::new(workers, spans));
     let window = open_window(args, &timeline, note)?;
     let mut manager = VeManager::new(build(args)?, settings)?;
-    if window.is_some() || args.trace.is_some() {
+    if window.is_some() || outputs.trace.is_some() {
         manager.watch(Arc::clone(&timeline));
     }
     let report = match window {
         Some(window) => {
             let mut measure = Measure::new(args.frames, count);
             measure.start();
-            let manager = window.run(manager, args.frames, &mut |record| measure.frame(record))?;
+            let picture = outputs.picture.as_ref();
+            let on_frame = &mut |record: &FrameRecord| measure.frame(record);
+            let manager = window.run(manager, args.frames, picture, on_frame)?;
             report(args, &manager, &measure, None)
         }
-        None => run_unwatched(args, manager, settings, count)?,
+        None => run_unwatched(args, outputs, manager, settings, count)?,
     };
-    if let Some(file) = &args.trace {
-        write_trace(&timeline, file).map_err(RunError::Trace)?;
+    if let Some(file) = &outputs.trace {
+        let write = |writer: &mut BufWriter<&File>| timeline.write_chrome_trace(writer);
+        outputs::replace(file, write).map_err(RunError::Trace)?;
     }
     Ok(report)
 }
@@ -118,6 +124,7 @@ fn open_window<'a>(
 /// Runs without a window.
 fn run_unwatched(
     args: &Particles,
+    outputs: &Outputs,
     mut manager: VeManager,
     settings: Settings,
     count: AllocationCounter<'_>,
@@ -140,7 +147,7 @@ fn run_unwatched(
     bar.finish_and_clear();
     let is_drawn = pictures.is_some();
     if let Some(pictures) = pictures {
-        pictures.finish()?;
+        pictures.finish(outputs.picture.as_ref())?;
     }
     let speed_up = match settings.executor {
         // Drawing is no part of the serial run.
@@ -162,12 +169,6 @@ fn progress_bar(frames: u64) -> ProgressBar {
         Ok(style) => bar.with_style(style),
         Err(_) => bar,
     }
-}
-
-fn write_trace(timeline: &Timeline, file: &std::path::Path) -> io::Result<()> {
-    let mut writer = io::BufWriter::new(std::fs::File::create(file)?);
-    timeline.write_chrome_trace(&mut writer)?;
-    io::Write::flush(&mut writer)
 }
 
 /// Seconds that the serial executor takes for the first frames of the same environment.

@@ -1,6 +1,6 @@
 //! Pictures without a window: of the last frame, or of every one.
 
-use std::fs;
+use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, sync_channel};
@@ -16,6 +16,7 @@ use dualframe_sim::object::Object;
 use dualframe_sim::render::Renderer;
 
 use super::args::Particles;
+use super::outputs;
 use super::particles::RunError;
 
 /// Pictures that wait to be written; usually 4.
@@ -28,7 +29,6 @@ pub(super) struct Pictures {
     frame: u64,
     last: u64,
     draws_every: bool,
-    picture: Option<PathBuf>,
     sequence: Option<Sequence>,
     failure: Option<GraphicsError>,
 }
@@ -51,7 +51,6 @@ impl Pictures {
             frame: 0,
             last: args.frames() - 1,
             draws_every,
-            picture: args.picture.clone(),
             sequence: sequence.map_err(RunError::Picture)?,
             failure: None,
         }))
@@ -61,16 +60,16 @@ impl Pictures {
         self.draws_every || self.frame == self.last
     }
 
-    /// Writes what is still to be written.
-    pub(super) fn finish(mut self) -> Result<(), RunError> {
+    /// Writes what is still to be written, the last frame's picture to `picture`.
+    pub(super) fn finish(mut self, picture: Option<&File>) -> Result<(), RunError> {
         if let Some(sequence) = self.sequence.take() {
             sequence.finish().map_err(RunError::Picture)?;
         }
         if let Some(failure) = self.failure.or_else(|| self.offscreen.painter.failure()) {
             return Err(failure.into());
         }
-        let Some(file) = &self.picture else { return Ok(()) };
-        self.offscreen.picture()?.save(file).map_err(RunError::Picture)
+        let Some(file) = picture else { return Ok(()) };
+        write(&self.offscreen.picture()?, file)
     }
 }
 
@@ -97,6 +96,16 @@ impl Renderer for Pictures {
     }
 }
 
+/// Writes a picture to a file of the outputs.
+pub(super) fn write(picture: &Picture, file: &File) -> Result<(), RunError> {
+    outputs::replace(file, |writer| picture.write_png(writer)).map_err(RunError::Picture)
+}
+
+/// The file in `folder` that gets a frame's picture.
+pub(super) fn file_of_frame(folder: &Path, frame: u64) -> PathBuf {
+    folder.join(format!("frame-{frame:06}.png"))
+}
+
 /// Pictures on their way to files, written by a thread of their own.
 struct Sequence {
     sender: SyncSender<(PathBuf, Picture)>,
@@ -106,7 +115,6 @@ struct Sequence {
 
 impl Sequence {
     fn new(folder: &Path) -> io::Result<Self> {
-        fs::create_dir_all(folder)?;
         let (sender, receiver) = sync_channel::<(PathBuf, Picture)>(WAITING);
         let write = move || receiver.iter().try_for_each(|(file, picture)| picture.save(&file));
         let writer = thread::Builder::new().name("pictures".to_owned()).spawn(write)?;
@@ -115,7 +123,7 @@ impl Sequence {
 
     fn add(&self, frame: u64, picture: Picture) {
         // A writer that has gone says at the end why.
-        let _ = self.sender.send((self.folder.join(format!("frame-{frame:06}.png")), picture));
+        let _ = self.sender.send((file_of_frame(&self.folder, frame), picture));
     }
 
     fn finish(self) -> io::Result<()> {

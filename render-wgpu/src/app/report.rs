@@ -1,12 +1,13 @@
 //! What a run comes to: a table for people, JSON for programs.
 
-use std::fs::{File, OpenOptions};
-use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::fs::File;
+use std::io::Write;
 
 use dualframe_sim::executor::StageSeconds;
 use dualframe_sim::object::{Fault, FaultKind, ObjectId};
 use serde::{Serialize, Serializer};
+
+use super::outputs;
 
 /// A run's report. The JSON keys stay as they are; more may come.
 #[derive(Serialize)]
@@ -96,12 +97,6 @@ impl From<&(ObjectId, Fault)> for Quarantined {
     }
 }
 
-/// Opens the file that the JSON will be written to, without touching what is in it yet.
-pub(super) fn open(path: &Path) -> Result<File, String> {
-    let opened = OpenOptions::new().write(true).create(true).truncate(false).open(path);
-    opened.map_err(|error| format!("cannot write {}: {error}", path.display()))
-}
-
 impl Report {
     /// Whether every object came through.
     pub(super) fn is_sound(&self) -> bool {
@@ -109,12 +104,10 @@ impl Report {
     }
 
     /// Writes the report as one JSON object.
-    pub(super) fn write(&self, file: File) -> Result<(), String> {
-        let written = file.set_len(0).and_then(|()| {
-            let mut writer = BufWriter::new(file);
-            serde_json::to_writer(&mut writer, self)?;
-            writer.write_all(b"\n")?;
-            writer.flush()
+    pub(super) fn write(&self, file: &File) -> Result<(), String> {
+        let written = outputs::replace(file, |writer| {
+            serde_json::to_writer(&mut *writer, self)?;
+            writer.write_all(b"\n")
         });
         written.map_err(|error| format!("cannot write the JSON: {error}"))
     }

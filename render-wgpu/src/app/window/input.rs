@@ -17,8 +17,8 @@ const LINES_PER_PIXEL: f64 = 0.02;
 /// Something done with mouse or keyboard outside the overlay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Gesture {
-    /// The left button went down.
-    Press,
+    /// The left button went down here, in pixels from the upper left. The mouse may be elsewhere by now.
+    Press(Vec2),
     /// The left button went up.
     Release,
     /// The mouse moved by so many pixels with this button down; downwards is positive.
@@ -70,7 +70,11 @@ impl Input {
         let is_down = state == ElementState::Pressed;
         self.held = is_down.then_some(button);
         if button == MouseButton::Left {
-            self.gestures.push(if is_down { Gesture::Press } else { Gesture::Release });
+            self.gestures.push(if is_down {
+                Gesture::Press(self.cursor)
+            } else {
+                Gesture::Release
+            });
         }
     }
 

@@ -14,6 +14,7 @@ mod stats;
 mod surface;
 mod view;
 
+use std::fs::File;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
@@ -33,6 +34,7 @@ pub(super) use self::controls::most_threads;
 use self::view::{Shown, View};
 use crate::app::args::Particles;
 use crate::app::particles::{self, RunError};
+use crate::app::pictures;
 
 /// How long a run of frames takes, about; usually 50 ms: so late may controls take effect.
 const RUN_SECONDS: f32 = 0.05;
@@ -84,6 +86,7 @@ impl<'a> Session<'a> {
         mut self,
         mut manager: VeManager,
         frames: Option<u64>,
+        picture: Option<&File>,
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<VeManager, RunError> {
         self.view.turn_to(self.view.painter.look.focus, manager.mailbox());
@@ -106,9 +109,9 @@ impl<'a> Session<'a> {
         if let Some(failure) = self.view.failure() {
             return Err(failure.into());
         }
-        if let Some(file) = &self.args.picture {
+        if let Some(file) = picture {
             self.take(&manager);
-            self.view.picture()?.save(file).map_err(RunError::Picture)?;
+            pictures::write(&self.view.picture()?, file)?;
         }
         Ok(manager)
     }

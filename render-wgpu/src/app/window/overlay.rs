@@ -74,7 +74,7 @@ impl Overlay {
 fn figures(ui: &mut Ui, stats: &Stats) {
     let [median, most, longest] = stats.percentiles();
     ui.heading(format!("{:.0} frames/s", stats.rate()));
-    ui.label(format!("frame time, ms: median {median:.2}, 99 % {most:.2}, longest {longest:.2}"));
+    ui.label(format!("ms a frame: median {median:.2}, 99 % {most:.1}, longest {longest:.1}"));
     let (collisions, candidates) = (stats.pairs.collisions, stats.pairs.candidates);
     ui.label(format!("frame {}: {collisions} collisions of {candidates} candidates", stats.frame));
 }

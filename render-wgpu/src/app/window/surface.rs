@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dualframe_render_wgpu::error::GraphicsError;
 use dualframe_render_wgpu::gpu::Gpu;
 use wgpu::{
-    CompositeAlphaMode, CurrentSurfaceTexture, Instance, PresentMode, Surface,
+    Backends, CompositeAlphaMode, CurrentSurfaceTexture, Instance, PresentMode, Surface,
     SurfaceConfiguration, SurfaceTexture, TextureFormat, TextureUsages,
 };
 use winit::window::Window;
@@ -26,7 +26,11 @@ pub(super) fn create(
     instance: &Instance,
     window: &Arc<Window>,
 ) -> Result<Surface<'static>, GraphicsError> {
-    instance.create_surface(Arc::clone(window)).map_err(refused)
+    instance.create_surface(Arc::clone(window)).map_err(|error| {
+        // Without an adapter there is no surface either, and nobody says that this is why.
+        let adapters = pollster::block_on(instance.enumerate_adapters(Backends::all()));
+        if adapters.is_empty() { GraphicsError::NoAdapter } else { refused(error) }
+    })
 }
 
 impl Screen {

@@ -1,6 +1,7 @@
 //! What the token's holder draws with: the window, its events and the pace.
 
 use std::cell::RefCell;
+use std::panic;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -65,6 +66,24 @@ pub(super) struct Shown {
     pub(super) timeline: Arc<Timeline>,
 }
 
+/// Connects to the display. Winit panics where one of the libraries is missing that it loads only now,
+/// which is to be told like all else.
+fn event_loop() -> Result<EventLoop<()>, GraphicsError> {
+    let hook = panic::take_hook();
+    panic::set_hook(Box::new(|_| {}));
+    let made = panic::catch_unwind(EventLoop::new);
+    panic::set_hook(hook);
+    match made {
+        Ok(made) => made.map_err(|_| GraphicsError::NoDisplay),
+        Err(panic) => {
+            let text = panic.downcast_ref::<&str>().copied().map(str::to_owned);
+            let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
+            let reason = text.unwrap_or("the display refused".to_owned());
+            Err(GraphicsError::Surface { reason: reason.trim_end_matches('.').to_owned() })
+        }
+    }
+}
+
 impl View {
     /// Opens a window.
     ///
@@ -76,7 +95,7 @@ impl View {
         controls: Controls,
     ) -> Result<Self, GraphicsError> {
         let refused = |reason: String| GraphicsError::Surface { reason };
-        let mut event_loop = EventLoop::new().map_err(|_| GraphicsError::NoDisplay)?;
+        let mut event_loop = event_loop()?;
         let mut input = Input::new(shown.title, shown.size);
         event_loop.pump_app_events(Some(Duration::from_millis(100)), &mut input);
         let window = match (input.window.clone(), input.failure.take()) {
@@ -147,9 +166,9 @@ impl View {
         }
         // The list keeps its memory.
         self.input.gestures = gestures;
-        let (point, aspect) = (self.point(), self.aspect());
+        let (point, aspect) = (self.point_at(self.input.cursor), self.aspect());
         self.hand.hold(&self.painter, &self.mailbox, point, aspect);
-        if self.screen.follow(self.painter.gpu()) {
+        if !self.is_closing() && self.screen.follow(self.painter.gpu()) {
             let (width, height) = self.screen.size();
             if let Err(error) = self.painter.resize(width, height) {
                 self.failure = Some(error);
@@ -161,8 +180,8 @@ impl View {
     fn act(&mut self, gesture: Gesture) {
         let Self { hand, painter, controls, .. } = self;
         match gesture {
-            Gesture::Press => {
-                let point = self.point();
+            Gesture::Press(cursor) => {
+                let point = self.point_at(cursor);
                 self.hand.press(&self.painter, point);
             }
             Gesture::Release => hand.release(&self.mailbox),
@@ -178,10 +197,10 @@ impl View {
         }
     }
 
-    /// Where the mouse is, from (−1, −1) at the lower left to (1, 1).
-    fn point(&self) -> Vec2 {
+    /// A pixel of the window, from (−1, −1) at the lower left to (1, 1).
+    fn point_at(&self, cursor: Vec2) -> Vec2 {
         let (width, height) = self.painter.size();
-        let share = self.input.cursor / Vec2::new(width as f32, height as f32);
+        let share = cursor / Vec2::new(width as f32, height as f32);
         Vec2::new(2.0 * share.x - 1.0, 1.0 - 2.0 * share.y)
     }
 
@@ -275,7 +294,7 @@ impl Renderer for View {
     }
 
     fn swap(&mut self, _frame: u64) {
-        if self.is_shown && self.failure().is_none() {
+        if self.is_shown && !self.is_closing() {
             self.redraw();
         }
         self.attend(Duration::ZERO);

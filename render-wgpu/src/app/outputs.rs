@@ -1,0 +1,58 @@
+//! The files that a run is to write. They are opened before any work is done: an hour's run must not end
+//! in "no such folder".
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use super::args::Particles;
+use super::pictures::file_of_frame;
+
+/// The files that a run is to write; what is in them is not touched yet.
+pub(super) struct Outputs {
+    pub(super) json: Option<File>,
+    pub(super) picture: Option<File>,
+    pub(super) trace: Option<File>,
+}
+
+impl Outputs {
+    /// Opens what `args` name, and makes the folder for the pictures of all frames.
+    pub(super) fn open(args: &Particles) -> Result<Self, String> {
+        if let Some(folder) = &args.frames_out {
+            make_folder(folder)?;
+            open(&file_of_frame(folder, 0))?;
+        }
+        let open = |path: &Option<_>| path.as_deref().map(open).transpose();
+        Ok(Self {
+            json: open(&args.json)?,
+            picture: open(&args.picture)?,
+            trace: open(&args.trace)?,
+        })
+    }
+}
+
+/// Opens a file that will be written, without touching what is in it yet.
+pub(super) fn open(path: &Path) -> Result<File, String> {
+    let opened = OpenOptions::new().write(true).create(true).truncate(false).open(path);
+    opened.map_err(|error| format!("cannot write {}: {error}", path.display()))
+}
+
+/// Makes a folder if it is not there.
+pub(super) fn make_folder(path: &Path) -> Result<(), String> {
+    let made = fs::create_dir_all(path);
+    made.map_err(|error| format!("cannot make the folder {}: {error}", path.display()))
+}
+
+/// Writes a file anew.
+pub(super) fn replace<'a>(
+    file: &'a File,
+    write: impl FnOnce(&mut BufWriter<&'a File>) -> io::Result<()>,
+) -> io::Result<()> {
+    // Pipes and devices have no length.
+    if file.metadata()?.is_file() {
+        file.set_len(0)?;
+    }
+    let mut writer = BufWriter::new(file);
+    write(&mut writer)?;
+    writer.flush()
+}

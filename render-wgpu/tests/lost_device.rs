@@ -1,0 +1,68 @@
+//! A graphics device that fails in mid-run harms nothing but the pictures.
+
+use dualframe_render_wgpu::error::GraphicsError;
+use dualframe_render_wgpu::gpu::Gpu;
+use dualframe_render_wgpu::look::{Look, Quality};
+use dualframe_render_wgpu::pick::Pick;
+use dualframe_render_wgpu::renderer::Offscreen;
+use dualframe_sim::blocking::Grain;
+use dualframe_sim::executor::{Entry, ExecutorKind};
+use dualframe_sim::manager::{Settings, VeManager};
+use dualframe_sim::render::NullRenderer;
+use dualframe_sim::scene::ParticleScene;
+use glam::Vec2;
+
+const FRAMES: u64 = 20;
+const LAST_GOOD_FRAME: u64 = 5;
+
+fn particles() -> ParticleScene {
+    ParticleScene::new(40)
+}
+
+fn manager(executor: ExecutorKind) -> VeManager {
+    let (grain, entry) = (Grain::Spatial, Entry::AfterUpdate);
+    let settings = Settings { executor, threads: 2, pinned: false, grain, entry };
+    let scene = particles().build().expect("the number of particles is allowed");
+    VeManager::new(scene, settings).expect("the settings are allowed")
+}
+
+#[test]
+#[ignore = "needs a graphics adapter; .ci/run has one"]
+fn the_run_goes_on() {
+    for executor in [ExecutorKind::Pipeline, ExecutorKind::Serial, ExecutorKind::RayonOverlapped] {
+        let mut undrawn = manager(executor);
+        let drawing_nothing = &mut NullRenderer::new();
+        undrawn.run(FRAMES, drawing_nothing, &mut |_| {}).expect("it runs");
+
+        let gpu = Gpu::new(None).expect("an adapter");
+        let look = Look::room(particles().room(), Quality::Fast);
+        let mut offscreen = Offscreen::new(gpu, look, (320, 200)).expect("the size is allowed");
+        let device = offscreen.painter.gpu().device.clone();
+        let (auxiliary, mut answers) = (offscreen.painter.auxiliary(), Vec::new());
+        let mut drawn = manager(executor);
+        let mut frames = 0;
+        let on_frame = &mut |_: &_| {
+            frames += 1;
+            if frames == LAST_GOOD_FRAME {
+                device.destroy();
+            }
+            let (answer, answered) = std::sync::mpsc::channel();
+            let pick = Pick { point: Vec2::ZERO, answer };
+            auxiliary.submit(Box::new(pick)).expect("the queue takes one a frame");
+            answers.push(answered);
+        };
+        drawn.run(FRAMES, &mut offscreen, on_frame).expect("it runs on");
+
+        assert_eq!(frames, FRAMES);
+        assert_eq!(drawn.state_hash(), undrawn.state_hash(), "{executor:?}");
+        let failure = offscreen.painter.failure().expect("the device failed");
+        assert!(matches!(failure, GraphicsError::Lost { .. }), "{failure:?}");
+        assert_eq!(failure.to_string().lines().count(), 1, "{failure}");
+        assert_eq!(offscreen.picture(), Err(failure));
+        // Whoever asked the device something hears of it, or that there will be no answer.
+        drop(offscreen);
+        for answered in answers.iter().skip(LAST_GOOD_FRAME as usize) {
+            answered.try_recv().expect_err("a device that is gone does not answer");
+        }
+    }
+}

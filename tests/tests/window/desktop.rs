@@ -1,0 +1,328 @@
+//! A display without a screen, and a person's hands and eyes on it: events as from real devices, and
+//! screenshots.
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use dualframe_tests::program::{command, read_json};
+use serde_json::Value;
+use tempfile::TempDir;
+use x11rb::CURRENT_TIME;
+use x11rb::connection::Connection;
+use x11rb::cookie::VoidCookie;
+use x11rb::errors::ConnectionError;
+use x11rb::protocol::xproto::{
+    AtomEnum, BUTTON_PRESS_EVENT, BUTTON_RELEASE_EVENT, ClientMessageEvent, ConfigureWindowAux,
+    ConnectionExt, EventMask, ImageFormat, InputFocus, KEY_PRESS_EVENT, KEY_RELEASE_EVENT,
+    MOTION_NOTIFY_EVENT, MapState, Window,
+};
+use x11rb::protocol::xtest::ConnectionExt as _;
+use x11rb::rust_connection::RustConnection;
+
+/// The display's width and height, in pixels.
+const SCREEN: (u16, u16) = (1280, 1024);
+/// How long anything is waited for: a software adapter on a busy machine is slow.
+const PATIENCE: Duration = Duration::from_secs(300);
+/// How long one waits before looking again.
+const GLANCE: Duration = Duration::from_millis(100);
+/// For how long a picture that stands still has not changed.
+pub(crate) const STILL: Duration = Duration::from_millis(1_500);
+
+/// Looks until `look` finds something.
+fn wait_for<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
+    let start = Instant::now();
+    loop {
+        if let Some(found) = look() {
+            return found;
+        }
+        assert!(start.elapsed() < PATIENCE, "waited in vain for {what}");
+        sleep(GLANCE);
+    }
+}
+
+/// An X server without a screen, which ends with its last client.
+struct Server(Child);
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let start = Instant::now();
+        while let Ok(None) = self.0.try_wait() {
+            if start.elapsed() > PATIENCE {
+                let _ = self.0.kill();
+            }
+            sleep(GLANCE);
+        }
+    }
+}
+
+/// A display on which nothing manages windows.
+pub(crate) struct Desktop {
+    connection: RustConnection,
+    root: Window,
+    number: String,
+    runtime: TempDir,
+    // Dropped after the connection.
+    _server: Server,
+}
+
+impl Desktop {
+    pub(crate) fn start() -> Self {
+        let mut server = Command::new("Xvfb")
+            .args(["-screen", "0", &format!("{}x{}x24", SCREEN.0, SCREEN.1)])
+            .args(["-displayfd", "1", "-nolisten", "tcp", "-terminate"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb starts, of the package xvfb");
+        let mut number = String::new();
+        let mut told = BufReader::new(server.stdout.take().expect("it is piped"));
+        told.read_line(&mut number).expect("Xvfb says its display's number");
+        let number = format!(":{}", number.trim());
+        let (connection, screen) =
+            RustConnection::connect(Some(&number)).expect("Xvfb takes connections");
+        let root = connection.setup().roots[screen].root;
+        let runtime = tempfile::tempdir().expect("a folder that only this user can look into");
+        Self { connection, root, number, runtime, _server: Server(server) }
+    }
+
+    /// The program with arguments, on this display.
+    pub(crate) fn command(&self, args: &[&str]) -> Command {
+        let mut command = command(args);
+        command
+            .env("DISPLAY", &self.number)
+            .env("XDG_RUNTIME_DIR", self.runtime.path())
+            .env("WINIT_X11_SCALE_FACTOR", "1");
+        command
+    }
+
+    /// Runs the program until there is something to be seen in its window.
+    pub(crate) fn open(&self, args: &[&str]) -> Session<'_> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let file = |name| File::create(folder.path().join(name)).expect("a file");
+        let report = folder.path().join("report.json");
+        let mut command = self.command(args);
+        command.arg("--json").arg(&report).stdout(file("stdout")).stderr(file("stderr"));
+        let child = command.spawn().expect("the program starts");
+        let mut session = Session { desktop: self, child, folder, window: x11rb::NONE };
+        session.window = wait_for("the window", || {
+            session.check();
+            self.window_called("dualframe")
+        });
+        session.wait_for("a picture", Screenshot::is_drawn);
+        let focus = InputFocus::PARENT;
+        self.sync(self.connection.set_input_focus(focus, session.window, CURRENT_TIME));
+        session
+    }
+
+    fn window_called(&self, title: &str) -> Option<Window> {
+        let tree = self.connection.query_tree(self.root).ok()?.reply().ok()?;
+        tree.children.into_iter().find(|&window| self.is_called(window, title) == Some(true))
+    }
+
+    fn is_called(&self, window: Window, title: &str) -> Option<bool> {
+        let (name, text) = (AtomEnum::WM_NAME, AtomEnum::ANY);
+        let name = self.connection.get_property(false, window, name, text, 0, 64).ok()?;
+        let attributes = self.connection.get_window_attributes(window).ok()?;
+        let is_mapped = attributes.reply().ok()?.map_state == MapState::VIEWABLE;
+        Some(name.reply().ok()?.value == title.as_bytes() && is_mapped)
+    }
+
+    fn fake(&self, kind: u8, detail: u8, x: i16, y: i16) {
+        let (now, root) = (CURRENT_TIME, self.root);
+        self.sync(self.connection.xtest_fake_input(kind, detail, now, root, x, y, 0));
+    }
+
+    /// Waits until the server has done what it was asked for.
+    fn sync(&self, asked: Result<VoidCookie<'_, RustConnection>, ConnectionError>) {
+        asked.expect("the server lives").check().expect("the server does as it is asked");
+    }
+
+    fn keycode(&self, symbol: u32) -> u8 {
+        let setup = self.connection.setup();
+        let count = setup.max_keycode - setup.min_keycode + 1;
+        let asked = self.connection.get_keyboard_mapping(setup.min_keycode, count);
+        let mapping = asked.expect("the server lives").reply().expect("there is a keyboard");
+        let mut keys = mapping.keysyms.chunks(usize::from(mapping.keysyms_per_keycode));
+        let index = keys.position(|symbols| symbols.first() == Some(&symbol));
+        setup.min_keycode + index.expect("the keyboard has the key") as u8
+    }
+}
+
+/// The program while it shows a window.
+pub(crate) struct Session<'a> {
+    desktop: &'a Desktop,
+    child: Child,
+    folder: TempDir,
+    window: Window,
+}
+
+impl Session<'_> {
+    /// Looks until something is to be seen.
+    pub(crate) fn wait_for(
+        &mut self,
+        what: &str,
+        is_there: impl Fn(&Screenshot) -> bool,
+    ) -> Screenshot {
+        wait_for(what, || {
+            self.check();
+            self.screenshot().filter(&is_there)
+        })
+    }
+
+    fn check(&mut self) {
+        let ended = self.child.try_wait().expect("it can be waited for");
+        assert!(ended.is_none(), "it ended: {ended:?} {}", self.read("stderr"));
+    }
+
+    /// Looks until something has been seen for a while.
+    pub(crate) fn wait_until_lasting(
+        &mut self,
+        what: &str,
+        is_there: impl Fn(&Screenshot) -> bool,
+    ) {
+        let mut since = Instant::now();
+        wait_for(what, || {
+            self.check();
+            if !self.screenshot().is_some_and(|now| is_there(&now)) {
+                since = Instant::now();
+            }
+            (since.elapsed() > 2 * STILL).then_some(())
+        });
+    }
+
+    /// Looks until the picture stands still.
+    pub(crate) fn wait_until_still(&mut self) -> Screenshot {
+        let (mut last, mut since) = (None, Instant::now());
+        wait_for("a picture that stands still", || {
+            self.check();
+            let now = self.screenshot();
+            if now.is_none() || now != last {
+                (last, since) = (now, Instant::now());
+            }
+            if since.elapsed() > STILL { last.take() } else { None }
+        })
+    }
+
+    /// The window's picture, as far as it is on the display; `None` if it cannot be seen.
+    fn screenshot(&self) -> Option<Screenshot> {
+        let connection = &self.desktop.connection;
+        let size = connection.get_geometry(self.window).ok()?.reply().ok()?;
+        let (width, height) = (size.width.min(SCREEN.0), size.height.min(SCREEN.1));
+        let format = ImageFormat::Z_PIXMAP;
+        let image = connection.get_image(format, self.window, 0, 0, width, height, !0).ok()?;
+        let pixels = image.reply().ok()?.data;
+        Some(Screenshot { width: width.into(), height: height.into(), pixels })
+    }
+
+    /// Moves the mouse to a pixel of the window.
+    pub(crate) fn move_to(&self, x: i16, y: i16) {
+        self.desktop.fake(MOTION_NOTIFY_EVENT, 0, x, y);
+    }
+
+    /// Presses the left button, or lets it go.
+    pub(crate) fn press(&self, is_down: bool) {
+        let kind = if is_down { BUTTON_PRESS_EVENT } else { BUTTON_RELEASE_EVENT };
+        self.desktop.fake(kind, 1, 0, 0);
+    }
+
+    /// Strikes the key of a symbol; letters are their own.
+    pub(crate) fn strike(&self, symbol: char) {
+        let code = self.desktop.keycode(symbol.into());
+        self.desktop.fake(KEY_PRESS_EVENT, code, 0, 0);
+        self.desktop.fake(KEY_RELEASE_EVENT, code, 0, 0);
+    }
+
+    pub(crate) fn resize(&self, width: u32, height: u32) {
+        let size = ConfigureWindowAux::new().width(width).height(height);
+        self.desktop.sync(self.desktop.connection.configure_window(self.window, &size));
+    }
+
+    /// Takes the window off the display, or puts it there again.
+    pub(crate) fn show(&self, is_shown: bool) {
+        let connection = &self.desktop.connection;
+        if is_shown {
+            self.desktop.sync(connection.map_window(self.window));
+        } else {
+            self.desktop.sync(connection.unmap_window(self.window));
+        }
+    }
+
+    /// Closes the window as a window manager does; see [`Session::end`].
+    pub(crate) fn close(self) -> Value {
+        let desktop = self.desktop;
+        let atom = |name: &str| {
+            let asked = desktop.connection.intern_atom(false, name.as_bytes());
+            asked.expect("the server lives").reply().expect("an atom").atom
+        };
+        let data = [atom("WM_DELETE_WINDOW"), CURRENT_TIME, 0, 0, 0];
+        let message = ClientMessageEvent::new(32, self.window, atom("WM_PROTOCOLS"), data);
+        let (window, nobody) = (self.window, EventMask::NO_EVENT);
+        desktop.sync(desktop.connection.send_event(false, window, nobody, message));
+        self.end()
+    }
+
+    /// Waits for its end, which is to be a sound one, and gives back what it reported.
+    pub(crate) fn end(mut self) -> Value {
+        let status = wait_for("the end", || self.child.try_wait().expect("it can be waited for"));
+        let (printed, told) = (self.read("stdout"), self.read("stderr"));
+        assert!(status.success() && told.is_empty(), "{status}: {told}");
+        assert!(printed.contains("state hash"), "{printed}");
+        read_json(&self.folder.path().join("report.json"))
+    }
+
+    fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.folder.path().join(name)).expect("plain text")
+    }
+}
+
+impl Drop for Session<'_> {
+    fn drop(&mut self) {
+        // It usually has ended.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// A window's pixels.
+#[derive(Clone, PartialEq)]
+pub(crate) struct Screenshot {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Blue, green, red and nothing, row by row from the top.
+    pixels: Vec<u8>,
+}
+
+impl Screenshot {
+    /// Red, green, blue.
+    pub(crate) fn pixel(&self, x: usize, y: usize) -> [u8; 3] {
+        let first = 4 * (y * self.width + x);
+        [2, 1, 0].map(|color| self.pixels[first + color])
+    }
+
+    /// Whether anything was drawn: a window is black before.
+    pub(crate) fn is_drawn(&self) -> bool {
+        self.pixel(self.width - 1, self.height - 1) != [0; 3]
+    }
+
+    /// The first of the overlay's sliders from above: the right end of its bar.
+    pub(crate) fn first_slider(&self) -> (usize, usize) {
+        // Where the bars of sliders are, and no border or text of anything else.
+        const WITHIN: (usize, usize) = (130, 165);
+        // Apart from the dithering.
+        let is_bar = |x, y| self.pixel(x, y).iter().all(|color| (58..=62).contains(color));
+        let is_row = |y| (WITHIN.0..WITHIN.1).all(|x| is_bar(x, y));
+        let top = (0..self.height - 6).find(|&top| (top..top + 6).all(is_row));
+        let y = top.expect("the overlay is shown") + 3;
+        let right = (WITHIN.1..self.width).find(|&x| !is_bar(x, y));
+        (right.expect("it ends") - 3, y)
+    }
+
+    /// The number of pixels that another one of the same size has in another colour.
+    pub(crate) fn difference(&self, other: &Self) -> usize {
+        let pixels = self.pixels.chunks_exact(4).zip(other.pixels.chunks_exact(4));
+        pixels.filter(|(one, other)| one[..3] != other[..3]).count()
+    }
+}

@@ -1,0 +1,215 @@
+//! The program's window, by what a person does to it and sees in it.
+#![forbid(unsafe_code)]
+
+mod desktop;
+
+use std::collections::BTreeMap;
+use std::thread::sleep;
+
+use dualframe_tests::program::{NO_ADAPTERS, read_json, report, told};
+use serde_json::Value;
+
+use self::desktop::{Desktop, STILL, Screenshot};
+
+/// One particle, in the middle of the picture.
+const ONE: [&str; 6] = ["--objects", "1", "--threads", "2", "--size", "640x480"];
+/// The middle of that picture.
+const MIDDLE: (i16, i16) = (320, 240);
+
+/// How far down the middle of that particle stays only where something pulls it: left alone, it is at 190 to
+/// 240, and lower for a moment at most.
+const FAR_DOWN: usize = 270;
+
+/// Where the middle of the particle is: the only thing that is rather red than green.
+fn middle(picture: &Screenshot) -> (usize, usize) {
+    let (mut count, mut x_sum, mut y_sum) = (0, 0, 0);
+    for y in 0..picture.height {
+        for x in 0..picture.width {
+            let [red, green, _] = picture.pixel(x, y);
+            if red > green.saturating_add(10) {
+                (count, x_sum, y_sum) = (count + 1, x_sum + x, y_sum + y);
+            }
+        }
+    }
+    (x_sum / count.max(1), y_sum / count.max(1))
+}
+
+/// The state that as many frames come to without a window.
+fn untouched(args: &[&str], frames: &Value) -> Value {
+    report(&[args, &["--frames", &frames.to_string()]].concat())["state_hash"].take()
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn watching_changes_nothing() {
+    let desktop = Desktop::start();
+    let args = ["--objects", "20", "--size", "640x480"];
+    let session = desktop.open(&[&args[..], &["--frames", "60", "--gravity"]].concat());
+    let report = session.end();
+    assert_eq!(report["frames"], 60);
+    let args = [&args[..], &["--gravity"]].concat();
+    assert_eq!(report["state_hash"], untouched(&args, &report["frames"]));
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn a_drag_moves_a_particle() {
+    let desktop = Desktop::start();
+    for is_dragged in [false, true] {
+        let mut session = desktop.open(&ONE);
+        session.strike(' ');
+        // The overlay would hide half of it.
+        session.strike('h');
+        let before = session.wait_until_still();
+        session.move_to(MIDDLE.0, MIDDLE.1);
+        if is_dragged {
+            session.press(true);
+        }
+        session.move_to(MIDDLE.0 + 150, MIDDLE.1 + 110);
+        session.strike(' ');
+        if is_dragged {
+            session.wait_until_lasting("the particle to follow", |now| middle(now).1 > FAR_DOWN);
+        } else {
+            session.wait_for("another picture", |now| now.difference(&before) > 0);
+        }
+        session.strike(' ');
+        session.wait_until_still();
+        session.press(false);
+        let report = session.close();
+        let is_untouched = report["state_hash"] == untouched(&ONE, &report["frames"]);
+        assert_eq!(is_untouched, !is_dragged);
+    }
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn the_slider_of_gravity_lets_a_particle_fall() {
+    let desktop = Desktop::start();
+    let mut session = desktop.open(&ONE);
+    // The overlay grows and shrinks with the number of workers at work.
+    session.strike(' ');
+    let paused = session.wait_until_still();
+    // It would not see a button that goes down and up between two pictures.
+    let (x, y) = paused.first_slider();
+    session.move_to(x as i16, y as i16);
+    session.press(true);
+    session.wait_until_still();
+    session.press(false);
+    session.wait_until_still();
+    session.strike('h');
+    session.strike(' ');
+    session.wait_until_lasting("the particle to lie on the floor", |now| middle(now).1 > FAR_DOWN);
+    let report = session.close();
+    assert_ne!(report["state_hash"], untouched(&ONE, &report["frames"]));
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn space_pauses_and_n_computes_single_frames() {
+    const STEPS: usize = 3;
+    let desktop = Desktop::start();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let trace = folder.path().join("trace.json");
+    let file = trace.to_str().expect("a plain path");
+    let mut session = desktop.open(&[&ONE[..], &["--trace", file]].concat());
+    session.strike(' ');
+    let mut before = session.wait_until_still();
+    for _ in 0..STEPS {
+        session.strike('n');
+        session.wait_for("the next frame", |now| now.difference(&before) > 0);
+        before = session.wait_until_still();
+    }
+    // It closes while it is paused, too.
+    let frames = session.close()["frames"].as_u64().expect("a number") as usize;
+    let begins = begins_of_frames(&read_json(&trace));
+    let pauses = begins.windows(2).rev().map(|pair| pair[1] - pair[0]);
+    assert_eq!(begins.len(), frames);
+    let short = pauses.take(STEPS).find(|&seconds| seconds < STILL.as_secs_f64());
+    assert_eq!(short, None, "each of the last frames was computed alone");
+}
+
+/// When the first work of each frame was begun, in seconds.
+fn begins_of_frames(trace: &Value) -> Vec<f64> {
+    let mut begins = BTreeMap::new();
+    for event in trace["traceEvents"].as_array().expect("a list of events") {
+        if let (Some(frame), Some(begin)) = (event["args"]["frame"].as_u64(), event["ts"].as_f64())
+        {
+            let first = begins.entry(frame).or_insert(begin);
+            *first = begin.min(*first);
+        }
+    }
+    begins.into_values().map(|microseconds| microseconds * 1e-6).collect()
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn a_window_of_any_size_shown_or_not() {
+    let desktop = Desktop::start();
+    let mut session = desktop.open(&["--objects", "20", "--size", "640x480"]);
+    for (width, height) in [(900, 700), (300, 40), (1, 1), (640, 900)] {
+        session.resize(width, height);
+        let size = (width as usize, height as usize);
+        let fits = |now: &Screenshot| (now.width, now.height) == size && now.is_drawn();
+        session.wait_for("a picture of the new size", fits);
+    }
+    for _ in 0..3 {
+        session.show(false);
+        session.show(true);
+    }
+    session.show(false);
+    sleep(STILL);
+    session.show(true);
+    let shown = session.wait_for("a picture", Screenshot::is_drawn);
+    session.wait_for("another picture", |now| now.is_drawn() && now.difference(&shown) > 0);
+    session.close();
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn odd_sizes() {
+    let desktop = Desktop::start();
+    for size in ["1x1", "16384x1", "1x4000"] {
+        let session = desktop.open(&["--objects", "5", "--size", size]);
+        session.close();
+    }
+}
+
+#[test]
+#[ignore = "needs Xvfb; .ci/run has it"]
+fn a_display_without_adapter() {
+    let desktop = Desktop::start();
+    let few = ["--objects", "5", "--frames", "5"];
+    let lacking =
+        [(NO_ADAPTERS[0], &[][..]), (NO_ADAPTERS[1], &[]), (&[], &["--adapter", "nonsense"])];
+    for (environment, args) in lacking {
+        let run = |more: &[&str]| {
+            let mut command = desktop.command(&[&few[..], args, more].concat());
+            command.envs(environment.iter().copied()).output().expect("the program starts")
+        };
+        let simulated = run(&[]);
+        told(&simulated, 0, "no graphics adapter");
+        assert!(String::from_utf8_lossy(&simulated.stdout).contains("state hash"));
+        told(&run(&["--window"]), 3, "no graphics adapter");
+    }
+}
+
+#[test]
+#[ignore = "needs Xvfb; .ci/run has it"]
+fn a_display_without_libraries() {
+    let desktop = Desktop::start();
+    for name in ["libxcb", "libxkbcommon-x11"] {
+        // What is here is loaded before any other of the name.
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        for end in [".so", ".so.0", ".so.1"] {
+            let file = folder.path().join(name.to_owned() + end);
+            std::fs::write(file, "no library").expect("it can be written");
+        }
+        let run = |args: &[&str]| {
+            let few = ["--objects", "5", "--frames", "5"];
+            let mut command = desktop.command(&[&few, args].concat());
+            command.env("LD_LIBRARY_PATH", folder.path()).output().expect("the program starts")
+        };
+        told(&run(&[]), 0, "running without a window");
+        told(&run(&["--window"]), 3, "");
+    }
+}
