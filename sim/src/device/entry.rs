@@ -20,9 +20,13 @@ pub(super) struct SmoothEntry {
 impl SmoothEntry {
     /// A model that says `new` comes at `time` where `shown` is being shown.
     pub(super) fn new(shown: Wrench, new: Wrench, time: f64, over: f64) -> Self {
-        let offset =
-            Wrench { force: shown.force - new.force, torque: shown.torque - new.torque };
+        let offset = Wrench { force: shown.force - new.force, torque: shown.torque - new.torque };
         Self { offset, began: time, over }
+    }
+
+    /// The same model begins anew from `shown`, with as much time to come in.
+    pub(super) fn again(&self, shown: Wrench, new: Wrench, time: f64) -> Self {
+        Self::new(shown, new, time, self.over)
     }
 
     /// What to show for a model that says `new`.

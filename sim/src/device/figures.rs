@@ -104,3 +104,42 @@ impl Forces {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn late_and_missed_ticks() {
+        let mut ticks = Ticks::default();
+        for (lateness, missed) in [(0.0, 0), (0.4e-3, 0), (0.6e-3, 0), (3.2e-3, 3), (0.1e-3, 0)] {
+            ticks.began(lateness, missed);
+        }
+        let expected = Ticks { due: 8, late: 5, missed: 3, latest: 3.2e-3, failed: 0 };
+        assert_eq!(ticks, expected);
+        assert_eq!(ticks.late_share(), 5.0 / 8.0);
+    }
+
+    #[test]
+    fn power_is_energy_per_second() {
+        let (mut forces, mut passivity) = (Forces::default(), Passivity::new(0.0));
+        for tick in 1..=250 {
+            passivity.observe(Vec3::Y, -Vec3::Y * 0.02);
+            forces.energy(f64::from(tick) * 0.01, &passivity);
+        }
+        assert!((forces.power - 2.0).abs() < 1e-3, "{} W", forces.power);
+        assert!((forces.absorbed - 5.0).abs() < 1e-3, "{} J", forces.absorbed);
+        assert_eq!(forces.least_absorbed, 0.0);
+    }
+
+    #[test]
+    fn errors() {
+        let mut forces = Forces::default();
+        for error in [3.0, 4.0, 0.0, 0.0] {
+            forces.interpolated(error);
+        }
+        assert_eq!((forces.error_rms(), forces.greatest_error), (2.5, 4.0));
+    }
+}

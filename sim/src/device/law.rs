@@ -108,12 +108,16 @@ impl ForceLaw {
             self.number = number;
         }
         let mut wanted = self.wanted(time, position);
-        let stored = self.model.energy_at(position) * f64::from(self.watchdog.share(time));
+        let share = self.watchdog.share(time);
+        let stored = self.model.energy_at(position) * f64::from(share);
         let damping = self.passivity.damping(stored, way, elapsed);
-        if damping > 0.0 {
-            wanted.force -= way * (damping / elapsed) as f32;
+        let resistance = if damping > 0.0 { way * (damping / elapsed) as f32 } else { Vec3::ZERO };
+        wanted.force -= resistance;
+        let lags = self.exert(wanted);
+        if lags && share == 1.0 {
+            let shown = Wrench { force: self.wrench.force + resistance, ..self.wrench };
+            self.entry = self.entry.again(shown, self.modelled(position), time);
         }
-        self.exert(wanted);
         self.last = Some((time, position));
         self.forces.damping = damping;
         self.forces.energy(time, &self.passivity);
@@ -166,13 +170,97 @@ impl ForceLaw {
         Wrench { force: force * share, torque: torque * share }
     }
 
-    /// Exerts what is wanted, within the bounds of the device and of a step.
-    fn exert(&mut self, wanted: Wrench) {
-        let force = wanted.force.clamp_length_max(self.device.max_force);
-        let force = limited_step(self.wrench.force, force, self.settings.max_step);
+    /// Exerts what is wanted, within the bounds of the device and of a step. Whether a step was too
+    /// large for a force that rises.
+    ///
+    /// Such a force must not catch up while the tool is on its way out, or it would give back more than it
+    /// took: who calls lets the model come in anew from what is exerted.
+    fn exert(&mut self, wanted: Wrench) -> bool {
+        let most = wanted.force.clamp_length_max(self.device.max_force);
+        let force = limited_step(self.wrench.force, most, self.settings.max_step);
         let torque = wanted.torque.clamp_length_max(self.device.max_torque);
         let torque = limited_step(self.wrench.torque, torque, self.settings.max_torque_step);
         self.forces.stepped(force.distance(self.wrench.force));
         self.wrench = Wrench { force, torque };
+        most != force && most.length_squared() > force.length_squared()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Mat3;
+
+    use super::*;
+    use crate::device::operator::SimulatedDevice;
+
+    const PERIOD: f64 = 1e-3;
+    const WALL: LocalModel = LocalModel {
+        gradient: Mat3::from_cols(Vec3::ZERO, Vec3::new(0.0, -1_000.0, 0.0), Vec3::ZERO),
+        normal: Some(Vec3::Y),
+        ..LocalModel::FREE
+    };
+
+    fn law() -> ForceLaw {
+        ForceLaw::new(SimulatedDevice::DESCRIPTION, ForceSettings::default())
+    }
+
+    /// The forces of ticks `from` to `to` of a tool that rests 2 mm inside, with a new model each tick.
+    fn rest(law: &mut ForceLaw, from: u64, to: u64) -> Vec<f32> {
+        let inside = DeviceSample::at(Vec3::Y * -2e-3);
+        let step = |tick: u64| law.step(tick as f64 * PERIOD, &inside, (tick, &WALL)).force.y;
+        (from..to).map(step).collect()
+    }
+
+    /// Whether no step from one force to the next is greater than the settings allow.
+    fn smooth(forces: &[f32]) -> bool {
+        let most = ForceSettings::default().max_step * 1.000_001;
+        forces.windows(2).all(|pair| (pair[1] - pair[0]).abs() <= most)
+    }
+
+    #[test]
+    fn comes_in_and_holds() {
+        let mut law = law();
+        let forces = rest(&mut law, 1, 400);
+        assert_eq!(forces[0], 0.0, "the first tick knows no motion, and does not push");
+        assert!((forces[398] - 2.0).abs() < 1e-3, "{}", forces[398]);
+        assert!(smooth(&forces), "{forces:?}");
+    }
+
+    #[test]
+    fn blind_ticks_let_go_and_what_follows_comes_in_again() {
+        let mut law = law();
+        rest(&mut law, 1, 400);
+        let blind: Vec<f32> = (0..10).map(|_| law.step_blind().force.y).collect();
+        assert!(smooth(&blind) && blind[9] == 0.0, "{blind:?}");
+        let back = rest(&mut law, 420, 820);
+        assert!(back[0] < 0.1 && smooth(&back), "{back:?}");
+        assert!((back[399] - 2.0).abs() < 1e-3, "{}", back[399]);
+    }
+
+    /// A tool that breaks in fast and goes out slowly: the force that could not rise in time must not
+    /// rise on the way out.
+    #[test]
+    fn a_force_that_lags_does_not_catch_up() {
+        let mut law = law();
+        let place = |tick: u64| if tick < 10 { -1e-3 * tick as f32 } else { -9e-3 };
+        let mut forces = Vec::new();
+        for tick in 0..12 {
+            let sample = DeviceSample::at(Vec3::Y * place(tick));
+            forces.push(law.step(1.0 + tick as f64 * PERIOD, &sample, (1 + tick, &WALL)).force.y);
+        }
+        assert!(forces[9] < 9.0 * 0.51 && smooth(&forces), "{forces:?}");
+        assert!(forces[11] - forces[9] < 0.8, "{forces:?}");
+    }
+
+    #[test]
+    fn torque_comes_in_and_is_bounded() {
+        let device = DeviceDescription { max_torque: 0.1, ..SimulatedDevice::DESCRIPTION };
+        let mut law = ForceLaw::new(device, ForceSettings::default());
+        let model = LocalModel { torque: Vec3::X, ..LocalModel::FREE };
+        let sample = DeviceSample::at(Vec3::ZERO);
+        let step = |tick: u64| law.step(tick as f64 * PERIOD, &sample, (tick, &model)).torque.x;
+        let torques: Vec<f32> = (1..200).map(step).collect();
+        assert!(torques.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 0.020_01), "{torques:?}");
+        assert!((torques[198] - 0.1).abs() < 1e-6, "{}", torques[198]);
     }
 }

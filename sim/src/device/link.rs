@@ -62,7 +62,10 @@ impl HapticLink {
     }
 
     /// The loop's end and the simulation's.
-    #[expect(clippy::missing_panics_doc, reason = "cells that are borrowed alone have no reader yet")]
+    #[expect(
+        clippy::missing_panics_doc,
+        reason = "cells that are borrowed alone have no reader yet"
+    )]
     pub fn split(&mut self) -> (LoopEnd<'_>, SimulationEnd<'_>) {
         let (tools_in, tools_out) = self.tools.split();
         let (models_in, models_out) = self.models.split();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 use thiserror::Error;
 
 use super::{DeviceDescription, DeviceError, DeviceSample, HapticDevice, Wrench};
@@ -121,6 +121,8 @@ impl HapticDevice for ScriptedDevice {
 
 #[cfg(test)]
 mod tests {
+    use glam::Quat;
+
     use super::*;
 
     fn keyframe(time: f64, x: f32, buttons: u32) -> Keyframe {

@@ -22,7 +22,10 @@ impl Mouse {
     }
 
     /// The window's end and the device.
-    #[expect(clippy::missing_panics_doc, reason = "a cell that is borrowed alone has no reader yet")]
+    #[expect(
+        clippy::missing_panics_doc,
+        reason = "a cell that is borrowed alone has no reader yet"
+    )]
     pub fn split(&mut self) -> (MouseInput<'_>, MouseDevice<'_>) {
         let (writer, readers) = self.0.split();
         let reader = readers.reader().expect("the first reader");

@@ -14,7 +14,8 @@
 //! - The reference is the energy V that the local model stores where the tool is. Where E falls short of
 //!   V, the difference was generated, and the controller takes it back by damping: α = (V − E)·T/Δx², at
 //!   most a stated one. For a wall of stiffness K that comes to α = K·T/2, just what holding a force
-//!   over a tick takes away from a loop.
+//!   over a tick takes away from a loop. It acts a tick late, so at speed v up to K·(v·T)²/2 may be
+//!   generated before it is taken back.
 //! - Where E exceeds V, it was dissipated and is gone: no credit is kept, or the controller would act
 //!   late (the fault of the first form that the second one mends).
 //!
@@ -95,7 +96,8 @@ mod tests {
             assert!((damping - expected).abs() < 1e-3 || depth < 1e-7, "tick {tick}: {damping}");
             force = Vec3::Y * (stiffness * depth) as f32 - way * (damping / period) as f32;
         }
-        assert!(passivity.least() > -1e-9, "{} J", passivity.least());
+        // What the last tick before the way out ends has generated is K·(v·T)²/2.
+        assert!(passivity.least() > -1.01e-5, "{} J", passivity.least());
     }
 
     #[test]

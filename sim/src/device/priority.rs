@@ -31,7 +31,8 @@ impl fmt::Display for Priority {
 
 impl Priority {
     /// Asks for real-time priority for the calling thread, and says what came of it.
-    pub(super) fn raise() -> Self {
+    #[must_use]
+    pub fn raise() -> Self {
         let value = ThreadPriorityValue::try_from(PRIORITY);
         let value = value.map_err(|_| Error::Priority("out of range"));
         match value.map(ThreadPriority::Crossplatform).and_then(raise) {

@@ -141,3 +141,79 @@ impl Proxy {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::DeviceSample;
+    use crate::device::link::HapticLink;
+
+    const RADIUS: f32 = 0.07;
+
+    /// A sphere, or a wall of 2 mm in the plane y = 0.
+    enum Body {
+        Sphere,
+        Wall,
+    }
+
+    impl Surface for Body {
+        fn distance(&self, point: Vec3) -> (f32, Vec3) {
+            match self {
+                Self::Sphere => (point.length() - RADIUS, point.normalize_or_zero()),
+                Self::Wall => (point.y.abs() - 1e-3, Vec3::Y * point.y.signum()),
+            }
+        }
+    }
+
+    /// A tool 3 mm deep, on its way round: the proxy stays on the surface, right above it.
+    #[test]
+    fn stays_on_the_surface() {
+        let mut proxy = Proxy::new(Vec3::Y * 0.1);
+        for step in 0..200 {
+            let angle = step as f32 * 0.05;
+            let outward = Vec3::new(angle.sin(), angle.cos(), 0.2).normalize();
+            let tool = outward * (RADIUS - 3e-3);
+            proxy.follow(tool, &Body::Sphere);
+            assert!(proxy.touches());
+            let off = proxy.position().length() - RADIUS;
+            assert!(off.abs() < 2.0 * TOLERANCE, "{off} m off");
+            let away = proxy.position().distance(outward * RADIUS);
+            assert!(away < 10.0 * TOLERANCE, "{away} m from the nearest point, step {step}");
+        }
+        let out = proxy.position() * 2.0;
+        proxy.follow(out, &Body::Sphere);
+        assert!(!proxy.touches());
+        assert_eq!(proxy.position(), out);
+    }
+
+    /// A tool that was pressed through a thin wall is pushed back to where it came from.
+    #[test]
+    fn keeps_its_side_of_a_thin_wall() {
+        let mut proxy = Proxy::new(Vec3::Y * 0.01);
+        for y in [5e-3, 0.5e-3, -0.5e-3, -5e-3] {
+            proxy.follow(Vec3::new(0.0, y, 0.0), &Body::Wall);
+        }
+        assert!(proxy.touches());
+        assert!(proxy.position().abs_diff_eq(Vec3::Y * 1e-3, 1e-6), "{}", proxy.position());
+        proxy.follow(Vec3::Y * 2e-3, &Body::Wall);
+        assert!(!proxy.touches());
+    }
+
+    #[test]
+    fn model_of_a_contact_and_of_a_gap() {
+        let mut link = HapticLink::new();
+        let (_, mut end) = link.split();
+        let mut proxy = Proxy::new(Vec3::Y);
+        for (height, force) in [(3e-3, 0.0), (-1e-3, 2.0)] {
+            let sample = DeviceSample::at(Vec3::Y * (RADIUS + height));
+            let tool = ToolState { sample, time: 3.0, ..end.tool() };
+            proxy.follow(sample.position, &Body::Sphere);
+            let model = proxy.model(&tool, ContactStiffness::BONE);
+            assert_eq!((model.time, model.position), (3.0, sample.position));
+            let pushed = model.force_at(sample.position);
+            assert!(pushed.abs_diff_eq(Vec3::Y * force, 5e-3), "{pushed} at {height} m");
+            let deep = model.force_at(Vec3::Y * (RADIUS - 1e-3));
+            assert!(deep.abs_diff_eq(Vec3::Y * 2.0, 5e-3), "{deep} from {height} m");
+        }
+    }
+}
