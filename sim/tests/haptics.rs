@@ -122,8 +122,9 @@ fn pressing() -> Motion {
     Motion::new(rounds).expect("in order")
 }
 
-/// Energy, in joules, that rounding may seem to generate in a minute.
-const ROUNDING: f64 = 1e-6;
+/// What a tick may generate before the limiter, which acts a tick late, takes it back, in joules:
+/// K·(v·T)²/2 for bone that is met at 0.4 m/s, faster than the hand gets here.
+const ONE_TICK: f64 = 0.5 * 2_000.0 * (0.4 * PERIOD) * (0.4 * PERIOD);
 /// Rate and delay of the pipeline, in hertz and seconds.
 const PIPELINES: [(f64, f64); 3] = [(60.0, 2.0 / 60.0), (60.0, 1.0 / 60.0), (300.0, 1.0 / 300.0)];
 
@@ -148,38 +149,30 @@ fn fastest(seen: &[Seen]) -> f32 {
     seen.iter().map(|seen| seen.speed).fold(0.0, f32::max)
 }
 
-/// Against bone for a minute: no energy is generated, no step is too large, the tool is never faster than
-/// the hand moves it, and what interpolation leaves is small.
+/// Against bone for a minute: at no time has the hand got more energy than it gave, no step is too large,
+/// the tool is never faster than the hand moves it in the air, and what interpolation leaves is small.
 #[test]
 fn closed_loop_is_passive_and_smooth() {
     let settings = ForceSettings::default();
-    for (hand, name) in [(Hand::LIGHT, "light"), (Hand::FIRM, "firm")] {
-        let alone = SimulatedDevice::new(hand, pressing());
-        let free = run(
-            alone,
-            Pipeline {
-                stiffness: ContactStiffness::new(0.0),
-                ..Pipeline::new(Bone::Flat, 60.0, 0.0)
-            },
-            settings,
-            4.0,
-        );
-        for bone in [Bone::Flat, Bone::Round] {
-            for (rate, delay) in PIPELINES {
-                let case = format!("{name} grip, {bone:?}, {rate} Hz, {delay} s");
-                let device = SimulatedDevice::new(hand, pressing());
-                let seen = run(device, Pipeline::new(bone, rate, delay), settings, 60.0);
-                let (least, step) = (least_energy(&seen), largest_step(&seen));
-                assert!(least > -ROUNDING, "{case}: {least} J");
-                assert!(step <= settings.max_step * 1.000_001, "{case}: a step of {step} N");
-                assert!(fastest(&seen) < 1.05 * fastest(&free), "{case}: {} m/s", fastest(&seen));
-                let forces = seen.last().expect("there are ticks").tool.forces;
-                println!("{case}: {forces:?}");
-                assert!((forces.least_absorbed - least).abs() < 1e-9, "{case}: {forces:?}");
-                assert!(forces.largest_step <= step * 1.000_001, "{case}: {forces:?}");
-                assert!(forces.error_rms() < 0.1, "{case}: {} N", forces.error_rms());
-                assert!(forces.greatest_age < delay + 2.0 / rate + PERIOD, "{case}: {forces:?}");
-            }
+    for hand in [Hand::LIGHT, Hand::FIRM] {
+        let mut air = Pipeline::new(Bone::Flat, 60.0, 0.0);
+        air.stiffness = ContactStiffness::new(0.0);
+        let fastest_in_air =
+            fastest(&run(SimulatedDevice::new(hand, pressing()), air, settings, 4.0));
+        for (bone, (rate, delay)) in PIPELINES.map(|p| [(Bone::Flat, p), (Bone::Round, p)]).concat()
+        {
+            let case = format!("{hand:?}, {bone:?}, {rate} Hz, {delay} s");
+            let device = SimulatedDevice::new(hand, pressing());
+            let seen = run(device, Pipeline::new(bone, rate, delay), settings, 60.0);
+            let (least, step) = (least_energy(&seen), largest_step(&seen));
+            assert!(least > -ONE_TICK, "{case}: {least} J");
+            assert!(step <= settings.max_step * 1.000_001, "{case}: a step of {step} N");
+            assert!(fastest(&seen) < 1.05 * fastest_in_air, "{case}: {} m/s", fastest(&seen));
+            let forces = seen.last().expect("there are ticks").tool.forces;
+            assert!((forces.least_absorbed - least).abs() < 1e-9, "{case}: {forces:?}");
+            assert!((forces.largest_step - step).abs() < 1e-6, "{case}: {forces:?}");
+            assert!(forces.error_rms() < 0.1, "{case}: {} N", forces.error_rms());
+            assert!(forces.greatest_age < delay + 2.0 / rate + PERIOD, "{case}: {forces:?}");
         }
     }
 }
@@ -191,8 +184,8 @@ fn without_the_limiter_the_loop_is_unstable() {
     for (rate, delay) in PIPELINES {
         let device = SimulatedDevice::new(Hand::LIGHT, pressing());
         let seen = run(device, Pipeline::new(Bone::Flat, rate, delay), settings, 60.0);
-        println!("control {} {}", least_energy(&seen), fastest(&seen));
-        assert!(least_energy(&seen) < -1.0, "{rate} Hz: {} J", least_energy(&seen));
+        let (least, fastest) = (least_energy(&seen), fastest(&seen));
+        assert!(least < -100.0 && fastest > 2.0, "{rate} Hz: {least} J, {fastest} m/s");
     }
 }
 
@@ -201,32 +194,27 @@ fn without_the_limiter_the_loop_is_unstable() {
 #[test]
 fn fades_when_the_pipeline_is_held_up() {
     let settings = ForceSettings::default();
+    let held_up = [3.0, 3.2];
     for hand in [Hand::LIGHT, Hand::FIRM] {
         for (rate, delay) in PIPELINES {
+            let case = format!("{hand:?}, {rate} Hz, {delay} s");
             let keyframes = [keyframe(0.2, 0.0, 0.01), keyframe(0.6, 0.0, -0.005)];
-            let pressing = Motion::new(keyframes).expect("in order");
-            let device = SimulatedDevice::new(hand, pressing);
-            let held_up = [3.0, 3.2];
+            let device = SimulatedDevice::new(hand, Motion::new(keyframes).expect("in order"));
             let pipeline = Pipeline { held_up, ..Pipeline::new(Bone::Flat, rate, delay) };
             let seen = run(device, pipeline, settings, 6.0);
-            let at = |time: f64| seen.iter().find(|seen| seen.time >= time).expect("it ran on");
-            let force = |time: f64| at(time).tool.wrench.force.length();
-            let after = || seen.iter().filter(|seen| seen.time > 3.2);
-            println!(
-                "{hand:?} {rate}: {} {} {} {} step {} fastest before {} after {} least {}",
-                force(2.99),
-                force(3.1),
-                force(3.199),
-                force(5.9),
-                largest_step(&seen),
-                fastest(&seen),
-                after().map(|s| s.speed).fold(0.0, f32::max),
-                least_energy(&seen)
-            );
-            assert!(force(2.99) > 0.1, "it presses");
-            assert!(force(3.1) < 0.8 * force(2.99) && force(3.199) == 0.0, "it fades");
-            assert!((force(5.9) - force(2.99)).abs() < 0.05 * force(2.99), "it is back");
-            assert!(largest_step(&seen) <= settings.max_step * 1.000_001);
+            let during =
+                |from: f64, to: f64| seen.iter().filter(move |s| from < s.time && s.time < to);
+            let force = |from, to| {
+                let forces = during(from, to).map(|seen| seen.tool.wrench.force.length());
+                forces.sum::<f32>() / during(from, to).count() as f32
+            };
+            let (before, after) = (force(2.5, 3.0), force(5.5, 6.0));
+            assert!(before > 0.2, "{case}: it presses with {before} N");
+            assert!(force(3.195, 3.2) == 0.0, "{case}: {} N", force(3.195, 3.2));
+            assert!((after - before).abs() < 0.05 * before, "{case}: {before} N, then {after} N");
+            assert!(largest_step(&seen) <= settings.max_step * 1.000_001, "{case}");
+            let speed = during(3.2, 6.0).map(|seen| seen.speed).fold(0.0, f32::max);
+            assert!(speed < 0.25, "{case}: thrown out at {speed} m/s");
         }
     }
 }

@@ -94,6 +94,7 @@ impl Forces {
     }
 
     pub(super) fn energy(&mut self, time: f64, passivity: &Passivity) {
+        self.damping = passivity.damping();
         self.absorbed = passivity.absorbed();
         self.least_absorbed = passivity.least();
         let (began, absorbed) = self.second;
@@ -124,7 +125,7 @@ mod tests {
 
     #[test]
     fn power_is_energy_per_second() {
-        let (mut forces, mut passivity) = (Forces::default(), Passivity::new(0.0));
+        let (mut forces, mut passivity) = (Forces::default(), Passivity::new(0.0, 0.0));
         for tick in 1..=250 {
             passivity.observe(Vec3::Y, -Vec3::Y * 0.02);
             forces.energy(f64::from(tick) * 0.01, &passivity);

@@ -81,7 +81,7 @@ impl ForceLaw {
             number: 0,
             entry: SmoothEntry::default(),
             watchdog: Watchdog::new(settings.timeout, settings.fade),
-            passivity: Passivity::new(settings.max_damping),
+            passivity: Passivity::new(settings.max_damping, device.resolution),
             last: None,
             wrench: Wrench::default(),
             forces: Forces::default(),
@@ -110,16 +110,14 @@ impl ForceLaw {
         let mut wanted = self.wanted(time, position);
         let share = self.watchdog.share(time);
         let stored = self.model.energy_at(position) * f64::from(share);
-        let damping = self.passivity.damping(stored, way, elapsed);
-        let resistance = if damping > 0.0 { way * (damping / elapsed) as f32 } else { Vec3::ZERO };
-        wanted.force -= resistance;
+        let resistance = self.passivity.resistance(stored, way, elapsed);
+        wanted.force += resistance;
         let lags = self.exert(wanted);
         if lags && share == 1.0 {
-            let shown = Wrench { force: self.wrench.force + resistance, ..self.wrench };
+            let shown = Wrench { force: self.wrench.force - resistance, ..self.wrench };
             self.entry = self.entry.again(shown, self.modelled(position), time);
         }
         self.last = Some((time, position));
-        self.forces.damping = damping;
         self.forces.energy(time, &self.passivity);
         if self.number > 0 {
             self.forces.aged(time - self.model.model().time);

@@ -30,6 +30,10 @@ use glam::Vec3;
 pub(super) struct Passivity {
     /// In newton seconds per metre.
     max_damping: f64,
+    /// In metres.
+    resolution: f64,
+    /// What is being added, in newton seconds per metre.
+    damping: f64,
     /// E, without what was dissipated, in joules.
     energy: f64,
     /// All that the hand has put in since the start, less what it got back, in joules.
@@ -39,8 +43,10 @@ pub(super) struct Passivity {
 }
 
 impl Passivity {
-    pub(super) fn new(max_damping: f64) -> Self {
-        Self { max_damping, energy: 0.0, absorbed: 0.0, least: 0.0 }
+    /// An observer that has seen nothing. `resolution` is the device's, in metres.
+    pub(super) fn new(max_damping: f64, resolution: f32) -> Self {
+        let resolution = resolution.into();
+        Self { max_damping, resolution, damping: 0.0, energy: 0.0, absorbed: 0.0, least: 0.0 }
     }
 
     /// Counts the work of a tick in which `force` was held while the tool moved by `way`.
@@ -51,17 +57,28 @@ impl Passivity {
         self.least = self.least.min(self.absorbed);
     }
 
-    /// The damping, in newton seconds per metre, that takes back in a tick of `time` seconds with a way
-    /// like the last one what was generated; `stored` is V, in joules.
-    pub(super) fn damping(&mut self, stored: f64, way: Vec3, time: f64) -> f64 {
+    /// The damping, in newtons, that takes back what was generated in a tick of `time` seconds with a way
+    /// like the last one; `stored` is V, in joules.
+    ///
+    /// Of the way, one step of the device's resolution may be no motion at all and is not damped: a tool
+    /// at rest between two steps would buzz.
+    pub(super) fn resistance(&mut self, stored: f64, way: Vec3, time: f64) -> Vec3 {
         self.energy = self.energy.min(stored);
         let generated = stored - self.energy;
-        let square = way.as_dvec3().length_squared();
-        if generated > 0.0 && square > 0.0 {
-            (generated * time / square).min(self.max_damping)
+        let length = way.as_dvec3().length();
+        let certain = length - self.resolution;
+        if generated > 0.0 && certain > 0.0 {
+            self.damping = (generated * time / (length * certain)).min(self.max_damping);
+            way * (-self.damping * certain / (length * time)) as f32
         } else {
-            0.0
+            self.damping = 0.0;
+            Vec3::ZERO
         }
+    }
+
+    /// In newton seconds per metre.
+    pub(super) fn damping(&self) -> f64 {
+        self.damping
     }
 
     /// In joules; positive: the hand has put in more than it got.
@@ -83,18 +100,21 @@ mod tests {
     #[test]
     fn half_the_stiffness_times_the_period() {
         let (stiffness, period, speed) = (2_000.0_f64, 1e-3, 0.1);
-        let (mut passivity, mut force, mut place) = (Passivity::new(100.0), Vec3::ZERO, 0.0_f64);
+        let (mut passivity, mut force, mut place) =
+            (Passivity::new(100.0, 0.0), Vec3::ZERO, 0.0_f64);
         for tick in 0..40 {
             let way = speed * period * if tick < 20 { -1.0 } else { 1.0 };
             place += way;
             let way = Vec3::Y * way as f32;
             passivity.observe(force, way);
             let depth = (-place).max(0.0);
-            let damping = passivity.damping(0.5 * stiffness * depth * depth, way, period);
+            let stored = 0.5 * stiffness * depth * depth;
+            let resistance = passivity.resistance(stored, way, period);
+            let damping = passivity.damping();
             // In the tick of the turn, the damping of the way in still acts, and pushes.
             let expected = if tick == 20 { 3.0 } else { 1.0 };
             assert!((damping - expected).abs() < 1e-3 || depth < 1e-7, "tick {tick}: {damping}");
-            force = Vec3::Y * (stiffness * depth) as f32 - way * (damping / period) as f32;
+            force = Vec3::Y * (stiffness * depth) as f32 + resistance;
         }
         // What the last tick before the way out ends has generated is K·(v·T)²/2.
         assert!(passivity.least() > -1.01e-5, "{} J", passivity.least());
@@ -102,11 +122,21 @@ mod tests {
 
     #[test]
     fn dissipated_energy_is_no_credit() {
-        let mut passivity = Passivity::new(100.0);
+        let mut passivity = Passivity::new(100.0, 0.0);
         passivity.observe(Vec3::Y, -Vec3::Y);
-        assert_eq!(passivity.damping(0.0, Vec3::Y, 1e-3), 0.0);
+        assert_eq!(passivity.resistance(0.0, Vec3::Y, 1e-3), Vec3::ZERO);
         passivity.observe(Vec3::Y, Vec3::Y * 0.01);
-        assert!(passivity.damping(0.0, Vec3::Y * 0.01, 1e-3) > 0.0);
-        assert_eq!(passivity.damping(0.0, Vec3::ZERO, 1e-3), 0.0, "at rest nothing can be taken");
+        assert!(passivity.resistance(0.0, Vec3::Y * 0.01, 1e-3).y < 0.0);
+        let at_rest = passivity.resistance(0.0, Vec3::ZERO, 1e-3);
+        assert_eq!(at_rest, Vec3::ZERO, "at rest nothing can be taken");
+    }
+
+    #[test]
+    fn a_step_of_the_resolution_is_no_motion() {
+        let mut passivity = Passivity::new(100.0, 1e-5);
+        passivity.observe(Vec3::Y, Vec3::Y);
+        assert_eq!(passivity.resistance(0.0, Vec3::Y * 0.9e-5, 1e-3), Vec3::ZERO);
+        let resistance = passivity.resistance(0.0, Vec3::Y * 3e-5, 1e-3);
+        assert!(resistance.abs_diff_eq(Vec3::Y * -2.0, 1e-4), "{resistance}");
     }
 }
