@@ -16,6 +16,7 @@
 //! | Object Interaction Manager: the complete set of interaction pairs | [`interaction::Rules`]; the queues are the core's |
 //! | thread pool | [`pool`] |
 //! | §6.2: messages | [`message`]; from outside: [`mailbox`] |
+//! | §6.3: haptic devices | [`device`] |
 //! | §7.1.1: particles | [`scene`] |
 //! | §7.2: the pipeline and what it is compared with | [`executor`] |
 //! | §7–§8: Eqs. 2–4, Figs. 11–17, Table 1 | `experiment`, with the feature of that name |
@@ -28,6 +29,7 @@
 pub mod behavior;
 pub mod block;
 pub mod blocking;
+pub mod device;
 pub mod executor;
 #[cfg(feature = "experiment")]
 pub mod experiment;

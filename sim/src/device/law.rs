@@ -1,0 +1,264 @@
+//! The force law of the haptic loop: what a device exerts, tick by tick.
+
+use glam::Vec3;
+
+use super::entry::{SmoothEntry, limited_step};
+use super::figures::Forces;
+use super::model::{Bounded, LocalModel};
+use super::passivity::Passivity;
+use super::watchdog::Watchdog;
+use super::{DeviceDescription, DeviceSample, Wrench};
+
+/// How forces come, change and go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceSettings {
+    /// The most by which the force changes from one tick to the next, in newtons. Usually 0.5: a wall of
+    /// 2 kN/m, met at 0.25 m/s, comes up at just that at 1 kHz.
+    pub max_step: f32,
+    /// The most by which the torque changes from one tick to the next, in newton metres. Usually 0.02: as
+    /// `max_step`, with the 4 cm from a tool's tip to the grip.
+    pub max_torque_step: f32,
+    /// How long a new model takes to come in, in seconds. Usually 1/60: a frame.
+    pub entry: f64,
+    /// How long after its predecessor a model may come before forces fade, in seconds. Usually 0.05:
+    /// three frames of 1/60 s.
+    pub timeout: f64,
+    /// How long forces take to fade when no model comes, and to come in when one comes then, in seconds.
+    /// Usually 0.1: about as fast as a hand reacts to a touch, so that it neither jerks nor sinks far.
+    pub fade: f64,
+    /// The most damping that the passivity controller adds, in newton seconds per metre; 0 switches it
+    /// off. Usually 20: a fifth of m/T for a device of 0.1 kg at 1 kHz, beyond which damping by the
+    /// speed of the tick before is itself unstable.
+    pub max_damping: f64,
+}
+
+impl Default for ForceSettings {
+    fn default() -> Self {
+        Self {
+            max_step: 0.5,
+            max_torque_step: 0.02,
+            entry: 1.0 / 60.0,
+            timeout: 0.05,
+            fade: 0.1,
+            max_damping: 20.0,
+        }
+    }
+}
+
+/// The force law: a state machine that is stepped by the time and the device's sample.
+///
+/// A tick evaluates the newest local model (Eq. 1), brings it in smoothly, lets it fade where models stay
+/// away, takes back by damping what energy was generated, and bounds the force and its step. The same
+/// inputs give the same bits.
+///
+/// Torques come in, fade and are bounded alike, but are not damped: Eq. 1 has no gradient for them, so
+/// no stiff loop closes through them within a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct ForceLaw {
+    device: DeviceDescription,
+    settings: ForceSettings,
+    model: Bounded,
+    /// The number of the model in use.
+    number: u64,
+    entry: SmoothEntry,
+    watchdog: Watchdog,
+    passivity: Passivity,
+    /// The time and the place of the last sample. None before the first one and after a lost one.
+    last: Option<(f64, Vec3)>,
+    /// What is being exerted.
+    wrench: Wrench,
+    forces: Forces,
+}
+
+impl ForceLaw {
+    /// A law that exerts nothing until a model comes.
+    #[must_use]
+    pub fn new(device: DeviceDescription, settings: ForceSettings) -> Self {
+        Self {
+            device,
+            settings,
+            model: Bounded::new(LocalModel::FREE, &device),
+            number: 0,
+            entry: SmoothEntry::default(),
+            watchdog: Watchdog::new(settings.timeout, settings.fade),
+            passivity: Passivity::new(settings.max_damping, device.resolution),
+            last: None,
+            wrench: Wrench::default(),
+            forces: Forces::default(),
+        }
+    }
+
+    /// One tick: what to exert from `time` on, for the tool as `sample` has it. `model` is the newest
+    /// local model, and `number` the how-manieth it is, from 1; 0 while there is none.
+    ///
+    /// Times must grow; a sample and a model must be finite.
+    pub fn step(
+        &mut self,
+        time: f64,
+        sample: &DeviceSample,
+        (number, model): (u64, &LocalModel),
+    ) -> Wrench {
+        let position = sample.position;
+        let (way, elapsed) =
+            self.last.map_or((Vec3::ZERO, 0.0), |(then, place)| (position - place, time - then));
+        self.passivity.observe(self.wrench.force, way);
+        let is_new = number != self.number;
+        if is_new || self.last.is_none() {
+            self.enter(time, position, model, is_new);
+            self.number = number;
+        }
+        let mut wanted = self.wanted(time, position);
+        let share = self.watchdog.share(time);
+        let stored = self.model.energy_at(position) * f64::from(share);
+        let resistance = self.passivity.resistance(stored, way, elapsed);
+        wanted.force += resistance;
+        let lags = self.exert(wanted);
+        if lags && share == 1.0 {
+            let shown = Wrench { force: self.wrench.force - resistance, ..self.wrench };
+            self.entry = self.entry.again(shown, self.modelled(position), time);
+        }
+        self.last = Some((time, position));
+        self.forces.energy(time, &self.passivity);
+        if self.number > 0 {
+            self.forces.aged(time - self.model.model().time);
+        }
+        self.wrench
+    }
+
+    /// A tick without a sample: the force goes towards zero, and what comes after begins anew.
+    pub fn step_blind(&mut self) -> Wrench {
+        self.last = None;
+        self.exert(Wrench::default());
+        self.wrench
+    }
+
+    /// What was measured.
+    #[must_use]
+    pub fn forces(&self) -> &Forces {
+        &self.forces
+    }
+
+    /// A model comes in: a new one, or the one in use after ticks without a sample.
+    fn enter(&mut self, time: f64, position: Vec3, model: &LocalModel, is_new: bool) {
+        let begins = self.last.is_none() || self.watchdog.share(time) < 1.0;
+        let shown = if begins { self.wrench } else { self.wanted(time, position) };
+        let over = if begins { self.settings.fade } else { self.settings.entry };
+        let new = Bounded::new(*model, &self.device);
+        if is_new {
+            self.watchdog.feed(time);
+            self.forces.models += 1;
+        }
+        if !begins {
+            let at = new.model().position;
+            self.forces.interpolated(new.force_at(at).distance(self.model.force_at(at)));
+        }
+        self.model = new;
+        self.entry = SmoothEntry::new(shown, self.modelled(position), time, over);
+    }
+
+    /// What the model says.
+    fn modelled(&self, position: Vec3) -> Wrench {
+        Wrench { force: self.model.force_at(position), torque: self.model.model().torque }
+    }
+
+    /// What the model says, as far as it has come in and has not faded.
+    fn wanted(&self, time: f64, position: Vec3) -> Wrench {
+        let share = self.watchdog.share(time);
+        let Wrench { force, torque } = self.entry.apply(self.modelled(position), time);
+        Wrench { force: force * share, torque: torque * share }
+    }
+
+    /// Exerts what is wanted, within the bounds of the device and of a step. Whether a step was too
+    /// large for a force that rises.
+    ///
+    /// Such a force must not catch up while the tool is on its way out, or it would give back more than it
+    /// took: who calls lets the model come in anew from what is exerted.
+    fn exert(&mut self, wanted: Wrench) -> bool {
+        let most = wanted.force.clamp_length_max(self.device.max_force);
+        let force = limited_step(self.wrench.force, most, self.settings.max_step);
+        let torque = wanted.torque.clamp_length_max(self.device.max_torque);
+        let torque = limited_step(self.wrench.torque, torque, self.settings.max_torque_step);
+        self.forces.stepped(force.distance(self.wrench.force));
+        self.wrench = Wrench { force, torque };
+        most != force && most.length_squared() > force.length_squared()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Mat3;
+
+    use super::*;
+    use crate::device::operator::SimulatedDevice;
+
+    const PERIOD: f64 = 1e-3;
+    const WALL: LocalModel = LocalModel {
+        gradient: Mat3::from_cols(Vec3::ZERO, Vec3::new(0.0, -1_000.0, 0.0), Vec3::ZERO),
+        normal: Some(Vec3::Y),
+        ..LocalModel::FREE
+    };
+
+    fn law() -> ForceLaw {
+        ForceLaw::new(SimulatedDevice::DESCRIPTION, ForceSettings::default())
+    }
+
+    /// The forces of ticks `from` to `to` of a tool that rests 2 mm inside, with a new model each tick.
+    fn rest(law: &mut ForceLaw, from: u64, to: u64) -> Vec<f32> {
+        let inside = DeviceSample::at(Vec3::Y * -2e-3);
+        let step = |tick: u64| law.step(tick as f64 * PERIOD, &inside, (tick, &WALL)).force.y;
+        (from..to).map(step).collect()
+    }
+
+    /// Whether no step from one force to the next is greater than the settings allow.
+    fn smooth(forces: &[f32]) -> bool {
+        let most = ForceSettings::default().max_step * 1.000_001;
+        forces.windows(2).all(|pair| (pair[1] - pair[0]).abs() <= most)
+    }
+
+    #[test]
+    fn comes_in_and_holds() {
+        let mut law = law();
+        let forces = rest(&mut law, 1, 400);
+        assert_eq!(forces[0], 0.0, "the first tick knows no motion, and does not push");
+        assert!((forces[398] - 2.0).abs() < 1e-3, "{}", forces[398]);
+        assert!(smooth(&forces), "{forces:?}");
+    }
+
+    #[test]
+    fn blind_ticks_let_go_and_what_follows_comes_in_again() {
+        let mut law = law();
+        rest(&mut law, 1, 400);
+        let blind: Vec<f32> = (0..10).map(|_| law.step_blind().force.y).collect();
+        assert!(smooth(&blind) && blind[9] == 0.0, "{blind:?}");
+        let back = rest(&mut law, 420, 820);
+        assert!(back[0] < 0.1 && smooth(&back), "{back:?}");
+        assert!((back[399] - 2.0).abs() < 1e-3, "{}", back[399]);
+    }
+
+    /// A tool that breaks in fast and goes out slowly: the force that could not rise in time must not
+    /// rise on the way out.
+    #[test]
+    fn a_force_that_lags_does_not_catch_up() {
+        let mut law = law();
+        let place = |tick: u64| if tick < 10 { -1e-3 * tick as f32 } else { -9e-3 };
+        let mut forces = Vec::new();
+        for tick in 0..12 {
+            let sample = DeviceSample::at(Vec3::Y * place(tick));
+            forces.push(law.step(1.0 + tick as f64 * PERIOD, &sample, (1 + tick, &WALL)).force.y);
+        }
+        assert!(forces[9] < 9.0 * 0.51 && smooth(&forces), "{forces:?}");
+        assert!(forces[11] - forces[9] < 0.8, "{forces:?}");
+    }
+
+    #[test]
+    fn torque_comes_in_and_is_bounded() {
+        let device = DeviceDescription { max_torque: 0.1, ..SimulatedDevice::DESCRIPTION };
+        let mut law = ForceLaw::new(device, ForceSettings::default());
+        let model = LocalModel { torque: Vec3::X, ..LocalModel::FREE };
+        let sample = DeviceSample::at(Vec3::ZERO);
+        let step = |tick: u64| law.step(tick as f64 * PERIOD, &sample, (tick, &model)).torque.x;
+        let torques: Vec<f32> = (1..200).map(step).collect();
+        assert!(torques.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 0.020_01), "{torques:?}");
+        assert!((torques[198] - 0.1).abs() < 1e-6, "{}", torques[198]);
+    }
+}

@@ -1,0 +1,148 @@
+//! Devices that a person holds, and the forces they are given (§6.3).
+//!
+//! A haptic loop must run at about 1 kHz, a pipeline runs at 60 to 300 Hz. So each has its own rate:
+//! the loop is a light thread ([`thread`]) that reads the device, computes a force and sends it, and it
+//! never waits for the pipeline. What passes between them goes through cells that hold the latest value
+//! ([`link`]): the state of the tool one way, a local model of the contact the other ([`model`], the
+//! paper's Eq. 1).
+//!
+//! | room | what it does |
+//! |---|---|
+//! | [`law`] | the force of each tick, as a state machine stepped by time and sample |
+//! | [`model`] | Eq. 1: force and gradient at a place, bounded to what the device can show |
+//! | [`proxy`] | contact with a surface: the god-object, and the local model it gives |
+//! | [`passivity`] | limits the energy that sampling and delay generate |
+//! | [`entry`] | new models come in, and forces change, without a kick |
+//! | [`watchdog`] | forces fade when no new model comes |
+//! | [`figures`] | what the loop measures about itself |
+//! | [`link`], [`thread`], [`priority`] | the two rates, joined |
+//! | [`mouse`], [`motion`], [`operator`] | devices: set from outside, scripted, simulated in a hand |
+//!
+//! Positions are in metres, forces in newtons, torques in newton metres, times in seconds on the haptic
+//! loop's own clock, which begins with the loop.
+
+pub mod entry;
+pub mod figures;
+pub mod law;
+pub mod link;
+pub mod model;
+pub mod motion;
+pub mod mouse;
+pub mod operator;
+pub mod passivity;
+pub mod priority;
+pub mod proxy;
+mod stiffness;
+pub mod thread;
+pub mod watchdog;
+
+use glam::{Quat, Vec3};
+use thiserror::Error;
+
+use crate::geometry::Bounds;
+
+/// What a device says at one moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeviceSample {
+    /// The place of the tool's tip, in metres.
+    pub position: Vec3,
+    /// The tool's orientation, of unit length.
+    pub orientation: Quat,
+    /// A bit for each button that is pressed, the first one lowest.
+    pub buttons: u32,
+}
+
+impl DeviceSample {
+    /// A tool at a place, upright, no button pressed.
+    #[must_use]
+    pub fn at(position: Vec3) -> Self {
+        Self { position, orientation: Quat::IDENTITY, buttons: 0 }
+    }
+
+    /// Whether every number of it is finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.position.is_finite() && self.orientation.is_finite()
+    }
+}
+
+/// What a device is told to exert on the hand.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    /// In newtons.
+    pub force: Vec3,
+    /// In newton metres.
+    pub torque: Vec3,
+}
+
+/// What a device can do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeviceDescription {
+    /// Its name, for people.
+    pub name: &'static str,
+    /// The least and the greatest rate it may be driven at, in hertz; usually up to 1,000 or 4,000.
+    pub rates: [f64; 2],
+    /// The space that its tip can reach, in metres; usually 0.1 to 0.2 across.
+    pub workspace: Bounds,
+    /// The steps in which it tells positions, in metres; usually 10⁻⁵ to 6·10⁻⁵; 0 for none.
+    pub resolution: f32,
+    /// The greatest force, in newtons; usually 3.3 to 12; 0 for a device without forces.
+    pub max_force: f32,
+    /// The greatest torque, in newton metres; usually 0 (three actuated axes) to 0.4.
+    pub max_torque: f32,
+    /// The greatest stiffness it can show, in newtons per metre; usually 1,000 to 14,500.
+    pub max_stiffness: f32,
+}
+
+impl DeviceDescription {
+    /// A device that is only read: no forces, any rate up to 4 kHz, everywhere.
+    #[must_use]
+    pub fn without_forces(name: &'static str) -> Self {
+        let workspace = Bounds::ALL;
+        let (max_force, max_torque, max_stiffness) = (0.0, 0.0, 0.0);
+        let rates = [1.0, 4_000.0];
+        Self { name, rates, workspace, resolution: 0.0, max_force, max_torque, max_stiffness }
+    }
+}
+
+/// Why a device could not be read or written. The loop counts it and tries again at the next tick.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum DeviceError {
+    /// Nobody answers.
+    #[error("the device is not connected")]
+    Disconnected,
+    /// It did not answer within the time that its driver allows.
+    #[error("the device did not answer in time")]
+    Timeout,
+    /// A position or an orientation that is no number.
+    #[error("the device told a pose that is not finite")]
+    NonFinite,
+    /// The driver's own error, by its number.
+    #[error("the device's driver says error {code}")]
+    Driver {
+        /// The driver's number for it.
+        code: i32,
+    },
+}
+
+/// A device that a person holds: position, orientation and buttons come in, force and torque go out.
+///
+/// A driver implements this. It is called by one thread, at the rate of the haptic loop, and should
+/// return well within a tick (0.25 to 1 ms): a driver that has to wait does so in a thread of its own.
+pub trait HapticDevice: Send {
+    /// What it can do. It does not change while the loop runs.
+    fn description(&self) -> DeviceDescription;
+
+    /// Where the tool is. `time` is the loop's, in seconds, and never goes back; a real device has no
+    /// need of it, a scripted or a simulated one moves by it.
+    ///
+    /// # Errors
+    /// The device cannot be read now.
+    fn read(&mut self, time: f64) -> Result<DeviceSample, DeviceError>;
+
+    /// Exerts a force and a torque until the next call.
+    ///
+    /// # Errors
+    /// The device cannot be written now.
+    fn write(&mut self, wrench: Wrench) -> Result<(), DeviceError>;
+}

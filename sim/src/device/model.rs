@@ -1,0 +1,177 @@
+//! The local model of a contact: what the pipeline tells the haptic loop (§6.3, Eq. 1).
+
+use glam::{DMat3, DVec3, Mat3, Vec3};
+use thiserror::Error;
+
+use super::DeviceDescription;
+use super::stiffness::principal;
+
+/// Below this, in newtons per metre, a direction counts as without stiffness: it stores no energy.
+/// Usually 1: a hundredth of the softest tissue that a hand can feel.
+const LEAST_STIFFNESS: f64 = 1.0;
+
+/// A contact to first order (Eq. 1): `F(P) = f(P_N) + ∇f(P_N)·(P − P_N)`.
+///
+/// The pipeline computes it from the tool's state in some frame and delivers it at its own rate; the
+/// haptic loop evaluates it at every tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocalModel {
+    /// f(P_N), in newtons.
+    pub force: Vec3,
+    /// The torque at P_N, in newton metres. Eq. 1 has no gradient for it.
+    pub torque: Vec3,
+    /// ∇f(P_N), in newtons per metre: usually negative semidefinite, −K along the normal of a contact.
+    pub gradient: Mat3,
+    /// P_N: where the tool was, in metres.
+    pub position: Vec3,
+    /// When it was there, in seconds on the haptic clock: the `time` of the tool's state.
+    pub time: f64,
+    /// The outward normal of a contact that only pushes, of unit length: where Eq. 1 would pull inward
+    /// along it, there is no force. So a model may already hold before the tool touches, with the
+    /// negative force that Eq. 1 gives for the gap. None for tissue that is held and pulls both ways.
+    pub normal: Option<Vec3>,
+}
+
+/// A local model that is no model.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum ModelError {
+    /// A number in it is not finite.
+    #[error("a local model with a number that is not finite")]
+    NonFinite,
+}
+
+impl LocalModel {
+    /// No contact anywhere near.
+    pub const FREE: Self = Self {
+        force: Vec3::ZERO,
+        torque: Vec3::ZERO,
+        gradient: Mat3::ZERO,
+        position: Vec3::ZERO,
+        time: 0.0,
+        normal: None,
+    };
+
+    /// The model itself if every number in it is finite.
+    ///
+    /// # Errors
+    /// [`ModelError::NonFinite`] if one is not.
+    pub fn checked(self) -> Result<Self, ModelError> {
+        let vectors = [self.force, self.torque, self.position, self.normal.unwrap_or_default()];
+        let finite = vectors.iter().all(|vector| vector.is_finite())
+            && self.gradient.is_finite()
+            && self.time.is_finite();
+        if finite { Ok(self) } else { Err(ModelError::NonFinite) }
+    }
+
+    /// The model's force at a place, in newtons: Eq. 1, and nothing where a contact would pull.
+    #[must_use]
+    pub fn force_at(&self, position: Vec3) -> Vec3 {
+        let force = self.force + self.gradient * (position - self.position);
+        let pulls = self.normal.is_some_and(|normal| force.dot(normal) <= 0.0);
+        if pulls { Vec3::ZERO } else { force }
+    }
+}
+
+/// A local model within what a device can show: symmetric, no direction stiffer than the device allows,
+/// none with a stiffness that pushes away (which would be unstable by itself), no force beyond the
+/// device's. With it, the energy that it stores.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounded {
+    model: LocalModel,
+    /// The pseudo-inverse of the stiffness, in metres per newton.
+    compliance: DMat3,
+    max_force: f32,
+}
+
+impl Bounded {
+    pub(super) fn new(model: LocalModel, device: &DeviceDescription) -> Self {
+        let symmetric = (model.gradient + model.gradient.transpose()) * 0.5;
+        let (values, vectors) = principal(symmetric.as_dmat3());
+        let most = f64::from(device.max_stiffness);
+        let stiffness = (-values).clamp(DVec3::ZERO, DVec3::splat(most));
+        let inverse = |k: f64| if k < LEAST_STIFFNESS { 0.0 } else { 1.0 / k };
+        let of = |diagonal: DVec3| vectors * DMat3::from_diagonal(diagonal) * vectors.transpose();
+        Self {
+            model: LocalModel { gradient: -of(stiffness).as_mat3(), ..model },
+            compliance: of(stiffness.map(inverse)),
+            max_force: device.max_force,
+        }
+    }
+
+    pub(super) fn model(&self) -> &LocalModel {
+        &self.model
+    }
+
+    /// In newtons; at most the device's greatest force.
+    pub(super) fn force_at(&self, position: Vec3) -> Vec3 {
+        self.model.force_at(position).clamp_length_max(self.max_force)
+    }
+
+    /// The energy stored at a place, in joules: fᵀK⁻¹f/2 for the force f of Eq. 1. Where the force is
+    /// held at the device's greatest, S, only what that force gives back: of a spring, S/K·(|f| − S/2).
+    pub(super) fn energy_at(&self, position: Vec3) -> f64 {
+        let force = self.model.force_at(position).as_dvec3();
+        let elastic = 0.5 * force.dot(self.compliance * force);
+        let share = f64::from(self.max_force) / force.length();
+        if share < 1.0 { elastic * share * (2.0 - share) } else { elastic }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::operator::SimulatedDevice;
+
+    fn wall(stiffness: f32) -> LocalModel {
+        LocalModel {
+            force: Vec3::new(0.0, stiffness * 1e-3, 0.0),
+            gradient: Mat3::from_diagonal(Vec3::new(0.0, -stiffness, 0.0)),
+            normal: Some(Vec3::Y),
+            ..LocalModel::FREE
+        }
+    }
+
+    #[test]
+    fn pushes_and_never_pulls() {
+        let model = wall(1_000.0);
+        assert_eq!(model.force_at(Vec3::ZERO), Vec3::Y);
+        assert_eq!(model.force_at(Vec3::new(0.3, -1e-3, 0.0)), Vec3::Y * 2.0);
+        assert_eq!(model.force_at(Vec3::Y * 2e-3), Vec3::ZERO);
+        let held = LocalModel { normal: None, ..model };
+        assert_eq!(held.force_at(Vec3::Y * 2e-3), -Vec3::Y);
+    }
+
+    #[test]
+    fn bounded_by_the_device() {
+        let device = SimulatedDevice::DESCRIPTION;
+        let skew = Mat3::from_cols(Vec3::Y, -Vec3::X, Vec3::ZERO) * 50.0;
+        let gradient = Mat3::from_diagonal(Vec3::new(100.0, -1e6, -300.0)) + skew;
+        let bounded = Bounded::new(LocalModel { gradient, ..LocalModel::FREE }, &device);
+        let expected = Mat3::from_diagonal(Vec3::new(0.0, -device.max_stiffness, -300.0));
+        assert!(bounded.model.gradient.abs_diff_eq(expected, 0.1), "{}", bounded.model.gradient);
+        let far = bounded.force_at(Vec3::new(0.0, -1.0, 0.0));
+        assert!((far.length() - device.max_force).abs() < 1e-3);
+    }
+
+    /// The stored energy is the work of the force on the way out.
+    #[test]
+    fn energy_is_the_work_that_comes_back() {
+        let bounded = Bounded::new(wall(2_000.0), &SimulatedDevice::DESCRIPTION);
+        for depth in [0.5e-3, 4e-3, 20e-3] {
+            let steps = 20_000;
+            let depth: f64 = depth;
+            let at = |step: f64| Vec3::Y * (1e-3 - depth * (1.0 - step / f64::from(steps))) as f32;
+            let force = |step: i32| f64::from(bounded.force_at(at(f64::from(step) + 0.5)).y);
+            let work = (0..steps).map(|step| force(step) * depth / f64::from(steps)).sum::<f64>();
+            let stored = bounded.energy_at(at(0.0));
+            assert!((work - stored).abs() < 1e-3 * stored, "{work} of {stored} J at {depth} m");
+        }
+    }
+
+    #[test]
+    fn not_a_number_is_refused() {
+        let broken = LocalModel { force: Vec3::NAN, ..LocalModel::FREE };
+        assert_eq!(broken.checked(), Err(ModelError::NonFinite));
+        assert_eq!(LocalModel::FREE.checked(), Ok(LocalModel::FREE));
+    }
+}

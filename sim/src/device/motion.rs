@@ -1,0 +1,154 @@
+//! Scripted motion: a tool that follows keyframes.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use thiserror::Error;
+
+use super::{DeviceDescription, DeviceError, DeviceSample, HapticDevice, Wrench};
+
+/// Where a tool is at one moment of a script.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Keyframe {
+    /// In seconds on the haptic loop's clock.
+    pub time: f64,
+    /// What the device says then. Its buttons hold until the next keyframe.
+    pub sample: DeviceSample,
+}
+
+/// Keyframes that are no script.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum MotionError {
+    /// There is none.
+    #[error("a motion without keyframes")]
+    Empty,
+    /// A time, a place or an orientation that is not finite, or an orientation of no length.
+    #[error("keyframe {index} has a number that is not finite, or no orientation")]
+    NonFinite {
+        /// The keyframe, from 0.
+        index: usize,
+    },
+    /// A keyframe that is not later than the one before it.
+    #[error("keyframe {index} is not later than the one before it")]
+    Order {
+        /// The keyframe, from 0.
+        index: usize,
+    },
+}
+
+/// A motion through keyframes: straight and even between two of them, at rest before the first and after
+/// the last.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion(Arc<[Keyframe]>);
+
+impl Motion {
+    /// A motion through some keyframes, in order of time. Orientations are taken to unit length.
+    ///
+    /// # Errors
+    /// [`MotionError`]: no keyframe, one out of order, or one with a number that is not finite.
+    pub fn new(keyframes: impl IntoIterator<Item = Keyframe>) -> Result<Self, MotionError> {
+        let mut keyframes: Vec<_> = keyframes.into_iter().collect();
+        let mut last = f64::NEG_INFINITY;
+        for (index, Keyframe { time, sample }) in keyframes.iter_mut().enumerate() {
+            sample.orientation = sample.orientation.normalize();
+            if !(time.is_finite() && sample.is_finite()) {
+                return Err(MotionError::NonFinite { index });
+            }
+            if *time <= last {
+                return Err(MotionError::Order { index });
+            }
+            last = *time;
+        }
+        if keyframes.is_empty() { Err(MotionError::Empty) } else { Ok(Self(keyframes.into())) }
+    }
+
+    /// A tool that rests.
+    ///
+    /// # Errors
+    /// [`MotionError::NonFinite`].
+    pub fn at_rest(position: Vec3) -> Result<Self, MotionError> {
+        Self::new([Keyframe { time: 0.0, sample: DeviceSample::at(position) }])
+    }
+
+    /// Where the tool is at a time, in seconds.
+    #[must_use]
+    pub fn at(&self, time: f64) -> DeviceSample {
+        let next = self.0.partition_point(|keyframe| keyframe.time <= time);
+        let Some(from) = next.checked_sub(1) else { return self.0[0].sample };
+        let (from, Some(to)) = (&self.0[from], self.0.get(next)) else {
+            return self.0[from].sample;
+        };
+        let share = ((time - from.time) / (to.time - from.time)) as f32;
+        DeviceSample {
+            position: from.sample.position.lerp(to.sample.position, share),
+            orientation: from.sample.orientation.lerp(to.sample.orientation, share),
+            buttons: from.sample.buttons,
+        }
+    }
+
+    /// When the last keyframe is, in seconds.
+    #[must_use]
+    pub fn end(&self) -> f64 {
+        self.0.last().map_or(0.0, |keyframe| keyframe.time)
+    }
+}
+
+/// A device that follows a script, whatever force it is given.
+#[derive(Clone, Debug)]
+pub struct ScriptedDevice(Motion);
+
+impl ScriptedDevice {
+    /// A device that follows `motion`.
+    #[must_use]
+    pub fn new(motion: Motion) -> Self {
+        Self(motion)
+    }
+}
+
+impl HapticDevice for ScriptedDevice {
+    fn description(&self) -> DeviceDescription {
+        DeviceDescription::without_forces("scripted motion")
+    }
+
+    fn read(&mut self, time: f64) -> Result<DeviceSample, DeviceError> {
+        Ok(self.0.at(time))
+    }
+
+    fn write(&mut self, _wrench: Wrench) -> Result<(), DeviceError> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Quat;
+
+    use super::*;
+
+    fn keyframe(time: f64, x: f32, buttons: u32) -> Keyframe {
+        let orientation = Quat::from_rotation_z(x);
+        Keyframe { time, sample: DeviceSample { position: Vec3::X * x, orientation, buttons } }
+    }
+
+    #[test]
+    fn between_keyframes_and_beyond_them() {
+        let motion = Motion::new([keyframe(1.0, 0.0, 1), keyframe(3.0, 0.5, 2)]).expect("in order");
+        for (time, x, buttons) in [(0.0, 0.0, 1), (1.0, 0.0, 1), (2.0, 0.25, 1), (4.0, 0.5, 2)] {
+            let sample = motion.at(time);
+            assert_eq!((sample.position, sample.buttons), (Vec3::X * x, buttons), "{time} s");
+            assert!(sample.orientation.angle_between(Quat::from_rotation_z(x)) < 1e-3);
+        }
+    }
+
+    #[test]
+    fn no_script() {
+        assert_eq!(Motion::new([]), Err(MotionError::Empty));
+        let order = [keyframe(1.0, 0.0, 0), keyframe(1.0, 0.0, 0)];
+        assert_eq!(Motion::new(order), Err(MotionError::Order { index: 1 }));
+        let broken = [keyframe(f64::NAN, 0.0, 0)];
+        assert_eq!(Motion::new(broken), Err(MotionError::NonFinite { index: 0 }));
+        let mut none = keyframe(0.0, 0.0, 0);
+        none.sample.orientation = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0);
+        assert_eq!(Motion::new([none]), Err(MotionError::NonFinite { index: 0 }));
+    }
+}

@@ -1,0 +1,120 @@
+//! The haptic loop in its thread: it ticks, tells the simulation, stops when dropped, and goes on after
+//! a device's error. No times are asserted.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::{scope, sleep};
+use std::time::Duration;
+
+use dualframe_sim::device::law::ForceSettings;
+use dualframe_sim::device::link::{HapticLink, SimulationEnd, ToolState};
+use dualframe_sim::device::model::LocalModel;
+use dualframe_sim::device::mouse::Mouse;
+use dualframe_sim::device::operator::SimulatedDevice;
+use dualframe_sim::device::thread::{HapticThread, LoopError, RATE};
+use dualframe_sim::device::{DeviceDescription, DeviceError, DeviceSample, HapticDevice, Wrench};
+use glam::Vec3;
+
+/// A device that counts, and that fails at each third reading.
+struct Faulty {
+    reads: Arc<AtomicU64>,
+    last: Arc<AtomicU64>,
+}
+
+impl HapticDevice for Faulty {
+    fn description(&self) -> DeviceDescription {
+        SimulatedDevice::DESCRIPTION
+    }
+
+    fn read(&mut self, _time: f64) -> Result<DeviceSample, DeviceError> {
+        match self.reads.fetch_add(1, Ordering::SeqCst) % 3 {
+            0 => Ok(DeviceSample::at(Vec3::X)),
+            1 => Err(DeviceError::Timeout),
+            _ => Ok(DeviceSample::at(Vec3::NAN)),
+        }
+    }
+
+    fn write(&mut self, wrench: Wrench) -> Result<(), DeviceError> {
+        self.last.store(u64::from(wrench.force.length().to_bits()), Ordering::SeqCst);
+        Ok(())
+    }
+}
+
+/// Waits until the loop says something.
+fn until(end: &mut SimulationEnd<'_>, said: impl Fn(&ToolState) -> bool) -> ToolState {
+    loop {
+        let tool = end.tool();
+        if said(&tool) {
+            return tool;
+        }
+        sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn ticks_and_tells_what_the_mouse_does() {
+    let (mut link, mut mouse) = (HapticLink::new(), Mouse::new(Vec3::ZERO));
+    let (end, mut simulation) = link.split();
+    let (mut input, device) = mouse.split();
+    scope(|scope| {
+        let settings = ForceSettings::default();
+        let haptics = HapticThread::spawn(scope, device, end, settings, RATE).expect("it starts");
+        println!("{}", haptics.priority());
+        input.set(DeviceSample::at(Vec3::Y));
+        let tool = until(&mut simulation, |tool| tool.sample.position == Vec3::Y);
+        assert!(tool.ticks.due > 0 && tool.time > 0.0);
+        let model = LocalModel { time: tool.time, ..LocalModel::FREE };
+        simulation.deliver(model).expect("finite");
+        until(&mut simulation, |tool| tool.forces.models == 1);
+    });
+}
+
+#[test]
+fn stops_when_dropped_and_lets_go() {
+    let mut link = HapticLink::new();
+    let (end, mut simulation) = link.split();
+    let (reads, last) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(u64::MAX)));
+    let device = Faulty { reads: Arc::clone(&reads), last: Arc::clone(&last) };
+    scope(|scope| {
+        let settings = ForceSettings::default();
+        let haptics = HapticThread::spawn(scope, device, end, settings, 500.0).expect("it starts");
+        until(&mut simulation, |tool| tool.ticks.due > 3);
+        drop(haptics);
+        let stopped = reads.load(Ordering::SeqCst);
+        sleep(Duration::from_millis(20));
+        assert_eq!(reads.load(Ordering::SeqCst), stopped, "it ticks on");
+        assert_eq!(last.load(Ordering::SeqCst), 0, "it lets the device go without force");
+    });
+}
+
+#[test]
+fn goes_on_after_errors() {
+    let mut link = HapticLink::new();
+    let (end, mut simulation) = link.split();
+    let (reads, last) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(0)));
+    let device = Faulty { reads, last };
+    scope(|scope| {
+        let settings = ForceSettings::default();
+        let _haptics = HapticThread::spawn(scope, device, end, settings, RATE).expect("it starts");
+        until(&mut simulation, |tool| tool.fault == Some(DeviceError::Timeout));
+        until(&mut simulation, |tool| tool.fault == Some(DeviceError::NonFinite));
+        let tool = until(&mut simulation, |tool| tool.fault.is_none() && tool.ticks.failed > 3);
+        assert_eq!(tool.sample.position, Vec3::X, "the last place that it told");
+        assert!(tool.ticks.failed < tool.ticks.due);
+    });
+}
+
+#[test]
+fn rates_are_the_devices() {
+    for rate in [100.0, 4_001.0, f64::NAN] {
+        let mut link = HapticLink::new();
+        let (end, _) = link.split();
+        let device = Faulty { reads: Arc::default(), last: Arc::default() };
+        scope(|scope| {
+            let spawned = HapticThread::spawn(scope, device, end, ForceSettings::default(), rate);
+            let error = spawned.expect_err("no such rate");
+            assert!(matches!(error, LoopError::Rate { .. }));
+            assert!(error.to_string().contains("takes 500 to 4000 Hz"), "{error}");
+        });
+    }
+}
