@@ -127,8 +127,8 @@ mod tests {
         let hand = Hand { mass: 0.1, damping: 1.0, stiffness: 100.0 };
         let motion = Motion::new(keyframes).expect("in order");
         let mut device = SimulatedDevice::new(hand, motion);
-        let decay = 1.5 / (2.0 * 0.2);
-        let swing = (100.0_f64 / 0.2 - decay * decay).sqrt();
+        let decay: f64 = 1.5 / (2.0 * 0.2);
+        let swing = (100.0 / 0.2 - decay * decay).sqrt();
         for tick in 1..500 {
             let time = f64::from(tick) * 1e-3;
             let x = f64::from(device.read(time).expect("always there").position.x);
