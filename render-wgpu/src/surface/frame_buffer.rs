@@ -37,13 +37,14 @@ impl FrameBuffer {
     ) -> Result<bool, GraphicsError> {
         self.words[..numbers.len()].copy_from_slice(numbers);
         let bytes: &[u8] = bytemuck::cast_slice(&self.words);
-        let (needed, limits) = (bytes.len() as u64, device.limits());
-        let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
-        if needed > most {
-            return Err(GraphicsError::Frame { needed, most });
-        }
+        let needed = bytes.len() as u64;
         let grows = needed > self.buffer.size();
         if grows {
+            let limits = device.limits();
+            let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
+            if needed > most {
+                return Err(GraphicsError::Frame { needed, most });
+            }
             self.buffer = new_buffer(device, bytes.len().next_power_of_two().min(most as usize));
             self.list = layouts.list(device, &self.buffer);
         }
