@@ -52,6 +52,7 @@ impl Default for Settings {
 pub struct VeManager {
     executor: Box<dyn Executor>,
     pool: Arc<Pool>,
+    settings: Settings,
 }
 
 impl VeManager {
@@ -88,7 +89,7 @@ impl VeManager {
             #[cfg(feature = "native-peers")]
             ExecutorKind::TbbPipeline => Box::new(TbbPipelineExecutor::new(scene, grain, threads)?),
         };
-        Ok(Self { executor, pool })
+        Ok(Self { executor, pool, settings })
     }
 
     /// Advances by `frames` frames; see [`Executor::advance`].
@@ -102,6 +103,16 @@ impl VeManager {
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<(), ExecutorError> {
         self.executor.advance(frames, renderer, on_frame)
+    }
+
+    /// How the environment is run, with as many threads as there are now.
+    #[must_use]
+    pub fn settings(&self) -> Settings {
+        let threads = match self.settings.executor {
+            ExecutorKind::Pipeline => self.pool.threads(),
+            _ => self.settings.threads,
+        };
+        Settings { threads, ..self.settings }
     }
 
     /// The pipeline's threads, whose number may be changed while frames run. The other executors

@@ -197,13 +197,15 @@ fn report(
         }
     });
     let seconds = measure.seconds();
+    // A window may have changed them.
+    let Settings { executor, threads, entry, .. } = manager.settings();
     let quarantined = manager.quarantined();
     let non_finite =
         quarantined.iter().filter(|(_, fault)| fault.kind == FaultKind::NonFinite).count();
     Report {
         scene: "particles",
-        executor: args.executor.name(),
-        threads: args.threads,
+        executor: executor.name(),
+        threads,
         simd: args.simd().instructions().name(),
         objects,
         nodes,
@@ -211,7 +213,7 @@ fn report(
         frames: measure.frames,
         seed: args.seed,
         gravity: args.gravity,
-        frames_in_flight: args.frames_in_flight,
+        frames_in_flight: if entry == Entry::AfterSwap { 1 } else { 2 },
         seconds,
         fps: measure.frames as f64 / seconds.max(f64::MIN_POSITIVE),
         speed_up,
