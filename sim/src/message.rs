@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::behavior::Instrument;
+use crate::device::DeviceSample;
 use crate::object::{Object, ObjectId};
 
 /// Something told to an object. It is processed immediately before the object's next update; what is
@@ -50,6 +52,10 @@ pub enum Message {
     Release,
     /// Switches the pull of gravity off (`true`) or on.
     Weightless(bool),
+    /// Where the device is that moves a tool; what is no tool ignores it.
+    Device(DeviceSample),
+    /// A tool switch: a tool becomes another instrument; what is no tool ignores it.
+    TakeUp(Instrument),
     /// Takes the object out of the environment for good.
     Remove,
     /// A message of the application's own making.

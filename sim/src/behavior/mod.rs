@@ -3,6 +3,7 @@
 mod abreast;
 pub(crate) mod batch;
 mod fixed;
+mod instrument;
 mod mass_spring;
 mod pull;
 mod scripted;
@@ -22,6 +23,7 @@ use crate::object::{Object, ObjectId};
 use crate::simd::Simd;
 
 pub use fixed::Fixed;
+pub use instrument::Instrument;
 pub use mass_spring::{MassSpring, MassSpringError};
 pub use scripted::{Keyframe, ScriptError, Scripted};
 pub use spring_kernel::Springs;

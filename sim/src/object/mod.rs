@@ -193,6 +193,8 @@ impl Object {
             | Message::Damping(_)
             | Message::Pull { .. }
             | Message::Release
+            | Message::Device(_)
+            | Message::TakeUp(_)
             | Message::Weightless(_) => self.behavior.process(message),
         }
     }
