@@ -3,6 +3,8 @@
 //! An interaction only reads its two objects. What it finds goes to a [`ContactSink`], and the
 //! objects' next updates add it up (§5.6).
 
+mod attachment;
+mod compliant;
 mod contact;
 mod impulses;
 mod nodes;
@@ -17,6 +19,8 @@ use crate::geometry::LANES;
 use crate::object::Object;
 use crate::stages::Stages;
 
+pub use attachment::{Attached, Link};
+pub use compliant::{Compliant, CompliantError};
 pub use contact::{Contact, ContactBuffer, ContactSink, TableFull};
 pub use impulses::Impulses;
 pub use nodes::NodeSpheres;
