@@ -6,7 +6,7 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use dualframe_sim::geometry::Topology;
 use glam::Vec3;
-use parry3d::shape::{SharedShape, TypedShape};
+use parry3d::shape::{Compound, SharedShape, TypedShape};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{BindGroup, Buffer, BufferUsages, Device};
 
@@ -184,8 +184,21 @@ fn outline(shape: &SharedShape) -> Option<(Vec<Vec3>, Vec<[u32; 3]>)> {
         TypedShape::Cone(shape) => Some(faceted(shape.to_trimesh(ROUND_SIDES))),
         TypedShape::ConvexPolyhedron(shape) => Some(faceted(shape.to_trimesh())),
         TypedShape::TriMesh(shape) => Some((shape.vertices().to_vec(), shape.indices().to_vec())),
+        TypedShape::Compound(shape) => together(shape),
         _ => None,
     }
+}
+
+/// The surfaces of a compound's parts, if they have one.
+fn together(compound: &Compound) -> Option<(Vec<Vec3>, Vec<[u32; 3]>)> {
+    let (mut nodes, mut triangles) = (Vec::new(), Vec::new());
+    for (pose, part) in compound.shapes() {
+        let (own, of_own) = outline(part)?;
+        let first = nodes.len() as u32;
+        nodes.extend(own.into_iter().map(|node| pose.transform_point(node)));
+        triangles.extend(of_own.into_iter().map(|triangle| triangle.map(|node| first + node)));
+    }
+    Some((nodes, triangles))
 }
 
 /// Gives every triangle nodes of its own, so that its edges look sharp.
@@ -198,6 +211,8 @@ fn faceted((nodes, triangles): (Vec<Vec3>, Vec<[u32; 3]>)) -> (Vec<Vec3>, Vec<[u
 
 #[cfg(test)]
 mod tests {
+    use parry3d::math::Pose;
+
     use super::*;
 
     #[test]
@@ -212,6 +227,19 @@ mod tests {
             surface.rings[5..14].chunks(3).map(|three| [three[0], three[1]]).collect();
         assert_eq!(ring, [[2, 1], [1, 3], [3, 2]]);
         assert_eq!(f32::from_bits(surface.rings[7]), 2.0);
+    }
+
+    #[test]
+    fn a_compound_is_its_parts() {
+        let ball = SharedShape::ball(1.0);
+        let parts = [Vec3::ZERO, Vec3::X * 3.0].map(|at| (Pose::from_translation(at), ball.clone()));
+        let (nodes, triangles) = outline(&SharedShape::compound(parts.to_vec())).expect("bounded");
+        let (one, of_one) = outline(&ball).expect("bounded");
+        assert_eq!((nodes.len(), triangles.len()), (2 * one.len(), 2 * of_one.len()));
+        let second = triangles[of_one.len()].map(|node| nodes[node as usize]);
+        assert_eq!(second, of_one[0].map(|node| one[node as usize] + Vec3::X * 3.0));
+        let unbounded = SharedShape::new(parry3d::shape::HalfSpace::new(Vec3::Y));
+        assert!(outline(&unbounded).is_none());
     }
 
     #[test]
