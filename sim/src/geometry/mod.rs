@@ -58,6 +58,14 @@ impl Geometry {
         }
     }
 
+    /// The rigid shape, to change it, if it is one.
+    pub fn as_rigid_mut(&mut self) -> Option<&mut Rigid> {
+        match self {
+            Self::Rigid(rigid) => Some(rigid),
+            Self::Mesh(_) | Self::Volume(_) => None,
+        }
+    }
+
     /// The voxel bone, if it is that.
     #[must_use]
     pub fn as_volume(&self) -> Option<&Volume> {

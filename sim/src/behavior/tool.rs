@@ -1,0 +1,353 @@
+//! A tool in somebody's hand: which instrument it is, where it goes, and what it does to what it touches.
+
+use std::any::Any;
+use std::hash::Hasher;
+
+use glam::{Quat, Vec3};
+use parry3d::math::Pose;
+use parry3d::shape::SharedShape;
+
+use super::drill::{Bit, Burr, Erode, Feed, Perforator, Reaction};
+use super::{Behavior, Input, Instrument, piece, tissue};
+use crate::device::DeviceSample;
+use crate::geometry::{Blade, Geometry, Rigid};
+use crate::message::{Custom, Message};
+use crate::object::{Object, ObjectId};
+
+/// The length of a scalpel's edge, from the tip on, in metres; usually 0.02.
+const EDGE: f32 = 0.02;
+/// How far from an elevator's tip it scrapes, in metres; usually 0.006.
+const SCRAPED: f32 = 0.006;
+/// How far from the tip forceps and hooks take hold, in metres; usually 0.008.
+const REACH: f32 = 0.008;
+/// The stiffness with which a node of tissue is held, in newtons per metre; usually 500.
+const HOLD: f32 = 500.0;
+/// The greatest force on a node that forceps hold, in newtons; usually 2.
+const FORCEPS_STRENGTH: f32 = 2.0;
+/// The greatest force on a node that a hook holds, in newtons; usually 10: it does not slip.
+const HOOK_STRENGTH: f32 = 10.0;
+/// The stiffness and the strength with which forceps hold a piece of bone, in newtons per metre and
+/// newtons; usually 1,000 and 20.
+const BONE_HOLD: [f32; 2] = [1_000.0, 20.0];
+/// How fast a burr turns, in radians per second; usually 3,140: 30,000 rpm.
+const BURR_SPIN: f32 = 3_140.0;
+/// How fast a craniotome turns, in radians per second; usually 6,280: 60,000 rpm.
+const CRANIOTOME_SPIN: f32 = 6_280.0;
+/// How strongly a hand pushes a burr or a craniotome, in newtons; usually 10.
+const PUSH: f32 = 10.0;
+/// How strongly a hand leans on a perforator, in newtons; usually 30.
+const LEAN: f32 = 30.0;
+/// How far a drill goes in bone in a frame at most, in metres; usually half a voxel of 0.5 mm.
+const BONE_STEP: f32 = 2.5e-4;
+/// How far a drill goes outside bone in a frame at most, in metres; usually 1.2 mm, the least radius of a
+/// bit, so that none is beyond the bone before it is felt.
+const FREE_STEP: f32 = 1.2e-3;
+/// The radius of the tips of instruments that touch tissue, in metres; usually 0.002.
+const BLUNT: f32 = 0.002;
+/// The length of a handle, for the eye, in metres; usually 0.12.
+const HANDLE: f32 = 0.12;
+
+/// What a tool can work on.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Workpieces {
+    /// Soft tissue: cut, scraped off, held.
+    pub tissue: Vec<ObjectId>,
+    /// Bone that is drilled.
+    pub bone: Vec<ObjectId>,
+    /// Free pieces of bone: held, and drilled too.
+    pub pieces: Vec<ObjectId>,
+}
+
+/// What a tool felt and did in the last frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Work {
+    /// The force of bone on it, in newtons.
+    pub bone: Vec3,
+    /// The force of soft tissue on it, in newtons.
+    pub tissue: Vec3,
+    /// Whether its bit turned.
+    pub turns: bool,
+}
+
+/// A tool that follows a device: a rigid shape whose origin is its tip, its handle along +z.
+///
+/// Where the device is comes as [`Message::Device`], a tool switch as [`Message::TakeUp`]; the first
+/// button presses a blade or an elevator, closes forceps and starts a drill. A drill does not follow into bone:
+/// it goes there as fast as it takes the bone away ([`Feed`]). What it does to others it posts to them, so that
+/// it happens in their own next update.
+pub struct Tool {
+    instrument: Instrument,
+    device: DeviceSample,
+    workpieces: Workpieces,
+    /// Where the edge was in the frame before, if it was this instrument's.
+    before: Option<Blade>,
+    holds: bool,
+    feeds: [Feed; 2],
+    perforator: Perforator,
+    reaction: Reaction,
+    side: Option<Vec3>,
+    spin: f32,
+    work: Work,
+    shapes: [SharedShape; Instrument::ALL.len()],
+}
+
+impl Tool {
+    /// A tool and its shape at a place; it can work on `workpieces`.
+    #[must_use]
+    pub fn new(instrument: Instrument, device: DeviceSample, workpieces: Workpieces) -> (Rigid, Self) {
+        let shapes = Instrument::ALL.map(shape);
+        let pose = Pose::from_parts(device.position, device.orientation);
+        let rigid = Rigid::new(shapes[instrument as usize].clone(), pose);
+        let feed = |strength| Feed::new(strength, Feed::RESISTANCE, FREE_STEP, BONE_STEP);
+        let feeds = [PUSH, LEAN].map(|strength| {
+            feed(strength).unwrap_or_else(|_| unreachable!("the constants are positive"))
+        });
+        let tool = Self {
+            instrument,
+            device,
+            workpieces,
+            before: None,
+            holds: false,
+            feeds,
+            perforator: Perforator::new(),
+            reaction: Reaction::default(),
+            side: None,
+            spin: 0.0,
+            work: Work::default(),
+            shapes,
+        };
+        (rigid, tool)
+    }
+
+    /// The tool that an object is, if it is.
+    #[must_use]
+    pub fn of(object: &Object) -> Option<&Self> {
+        let behavior: &dyn Any = &*object.behavior;
+        behavior.downcast_ref()
+    }
+
+    /// The tool that an object is, to change it.
+    pub fn of_mut(object: &mut Object) -> Option<&mut Self> {
+        let behavior: &mut dyn Any = &mut *object.behavior;
+        behavior.downcast_mut()
+    }
+
+    /// What it is at the moment.
+    #[must_use]
+    pub fn instrument(&self) -> Instrument {
+        self.instrument
+    }
+
+    /// Whether its button is pressed.
+    #[must_use]
+    pub fn is_pressed(&self) -> bool {
+        self.device.buttons & 1 == 1
+    }
+
+    /// What it felt and did in the last frame.
+    #[must_use]
+    pub fn work(&self) -> Work {
+        self.work
+    }
+
+    /// What it can work on, to add what is new.
+    pub fn workpieces_mut(&mut self) -> &mut Workpieces {
+        &mut self.workpieces
+    }
+
+    fn bit(&self) -> Option<Bit> {
+        bit(self.instrument)
+    }
+
+    /// Where the tip goes in this frame.
+    fn next(&self, tip: Vec3, time: f32) -> Vec3 {
+        let wanted = self.device.position;
+        match self.instrument {
+            Instrument::Perforator => self.feeds[1].next(tip, wanted, &self.reaction, time),
+            Instrument::Burr | Instrument::Craniotome => {
+                self.feeds[0].next(tip, wanted, &self.reaction, time)
+            }
+            _ => wanted,
+        }
+    }
+
+    /// How fast the bit turns in this frame, in radians per second.
+    fn turn(&mut self) -> f32 {
+        let pressed = self.is_pressed();
+        match self.instrument {
+            Instrument::Perforator if pressed => self.perforator.turn(self.reaction.tip),
+            Instrument::Burr if pressed => BURR_SPIN,
+            Instrument::Craniotome if pressed => CRANIOTOME_SPIN,
+            _ => 0.0,
+        }
+    }
+
+    /// Does what the instrument does, from `now` on.
+    fn act(&mut self, rigid: &Rigid, now: Blade, input: &mut Input<'_>) {
+        let by = input.object;
+        let pressed = self.is_pressed();
+        if self.holds && !matches!(self.instrument, Instrument::Forceps | Instrument::Hook) {
+            self.let_go(input);
+            self.holds = false;
+        }
+        match self.instrument {
+            Instrument::Scalpel if pressed => {
+                let before = self.before.unwrap_or(now);
+                tell(input, &self.workpieces.tissue, || tissue::Cut { by, before, now });
+            }
+            Instrument::Elevator if pressed => {
+                let center = rigid.pose.translation;
+                let scrape = || tissue::Scrape { center, radius: SCRAPED };
+                tell(input, &self.workpieces.tissue, scrape);
+            }
+            Instrument::Forceps | Instrument::Hook => self.hold(rigid.pose.translation, input),
+            _ => {}
+        }
+    }
+
+    /// Takes hold, holds on or lets go.
+    fn hold(&mut self, at: Vec3, input: &mut Input<'_>) {
+        let by = input.object;
+        let Workpieces { tissue, pieces, .. } = &self.workpieces;
+        match (self.holds, self.is_pressed()) {
+            (false, true) => {
+                let hook = self.instrument == Instrument::Hook;
+                let strength = if hook { HOOK_STRENGTH } else { FORCEPS_STRENGTH };
+                let grasp = || tissue::Grasp { by, point: at, radius: REACH, stiffness: HOLD, strength };
+                tell(input, tissue, grasp);
+                let [stiffness, strength] = BONE_HOLD;
+                let (point, radius) = (at.to_array(), REACH);
+                tell(input, pieces, || piece::Grasp { by, point, radius, stiffness, strength });
+            }
+            (true, true) => {
+                tell(input, tissue, || tissue::Hold { by, position: at });
+                tell(input, pieces, || piece::Hold { by, position: at.to_array() });
+            }
+            (true, false) => self.let_go(input),
+            (false, false) => {}
+        }
+        self.holds = self.is_pressed();
+    }
+
+    fn let_go(&self, input: &mut Input<'_>) {
+        let by = input.object;
+        tell(input, &self.workpieces.tissue, || tissue::LetGo { by });
+        tell(input, &self.workpieces.pieces, || piece::LetGo { by });
+    }
+
+    /// Notes what this frame's contacts did, and lets a turning bit take bone away.
+    fn feel(&mut self, geometry: &Geometry, input: &mut Input<'_>) {
+        let Workpieces { bone, pieces, .. } = &self.workpieces;
+        let is_bone = |other: ObjectId| bone.contains(&other) || pieces.contains(&other);
+        let on_bone = input.contacts().filter(|contact| is_bone(contact.other));
+        let reaction = Reaction::new(on_bone, input.time_step);
+        let on_tissue = input.contacts().filter(|contact| !is_bone(contact.other));
+        let tissue = Reaction::new(on_tissue, input.time_step).force;
+        let touched = bone.iter().chain(pieces).copied();
+        let drilled: Vec<_> = touched
+            .filter(|&other| input.contacts().any(|contact| contact.other == other))
+            .collect();
+        if let Some(burr) = self.burr(geometry).filter(|burr| burr.spin != 0.0) {
+            let load = reaction.load();
+            for bone in drilled {
+                input.post(bone, Message::Custom(Box::new(Erode { burr, load })));
+            }
+        }
+        self.reaction = reaction;
+        self.side = reaction.normal();
+        self.work = Work { bone: reaction.force, tissue, turns: self.spin != 0.0 };
+    }
+}
+
+/// Posts a message to each of some objects.
+fn tell<C: Custom + 'static>(input: &mut Input<'_>, to: &[ObjectId], message: impl Fn() -> C) {
+    to.iter().for_each(|&to| input.post(to, Message::Custom(Box::new(message()))));
+}
+
+impl Behavior for Tool {
+    fn update(&mut self, geometry: &mut Geometry, input: &mut Input<'_>) {
+        self.feel(geometry, input);
+        let Some(rigid) = geometry.as_rigid_mut() else { return };
+        self.spin = self.turn();
+        let tip = rigid.pose.translation;
+        let next = self.next(tip, input.time_step);
+        rigid.velocity = (next - tip) / input.time_step;
+        rigid.pose = Pose::from_parts(next, self.device.orientation);
+        let blade = Blade { tip: next, heel: next + axis(self.device.orientation) * EDGE };
+        self.act(rigid, blade, input);
+        self.before = Some(blade);
+        rigid.shape = self.shapes[self.instrument as usize].clone();
+    }
+
+    fn process(&mut self, message: &Message) {
+        match *message {
+            Message::Device(sample) if sample.is_finite() => self.device = sample,
+            Message::TakeUp(instrument) if instrument != self.instrument => {
+                self.instrument = instrument;
+                self.before = None;
+                self.perforator = Perforator::new();
+            }
+            _ => {}
+        }
+    }
+
+    fn burr(&self, geometry: &Geometry) -> Option<Burr> {
+        let pose = geometry.as_rigid()?.pose;
+        let bit = self.bit()?;
+        let axis = axis(pose.rotation);
+        let center = pose.translation + axis * bit.radius;
+        Some(Burr { bit, center, axis, spin: self.spin, side: self.side })
+    }
+
+    fn hash_state(&self, hasher: &mut dyn Hasher) {
+        hasher.write_u8(self.instrument as u8);
+        hasher.write(&self.device.buttons.to_le_bytes());
+        let orientation = self.device.orientation.to_array();
+        for value in self.device.position.to_array().into_iter().chain(orientation) {
+            hasher.write(&value.to_le_bytes());
+        }
+        hasher.write_u8(u8::from(self.holds));
+        hasher.write(&self.spin.to_le_bytes());
+        self.perforator.hash_state(hasher);
+    }
+}
+
+/// The bit of an instrument that drills.
+fn bit(instrument: Instrument) -> Option<Bit> {
+    match instrument {
+        Instrument::Perforator => Some(Bit::PERFORATOR),
+        Instrument::Burr => Some(Bit::BURR),
+        Instrument::Craniotome => Some(Bit::CRANIOTOME),
+        _ => None,
+    }
+}
+
+/// The direction of the handle.
+fn axis(orientation: Quat) -> Vec3 {
+    // The quaternion type's own product differs between vector units.
+    let [x, y, z, w] = orientation.to_array();
+    Vec3::new(2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y))
+}
+
+/// What an instrument looks like, and touches tissue with.
+fn shape(instrument: Instrument) -> SharedShape {
+    let ball = |radius: f32| (Pose::from_translation(Vec3::Z * radius), SharedShape::ball(radius));
+    let rod = |from: f32, to: f32, radius: f32| {
+        let rod = SharedShape::capsule(Vec3::Z * (from + radius), Vec3::Z * (to - radius), radius);
+        (Pose::IDENTITY, rod)
+    };
+    let parts = match instrument {
+        Instrument::Scalpel => vec![
+            (Pose::from_translation(Vec3::Z * (0.5 * EDGE)), SharedShape::cuboid(3e-4, 2e-3, 0.5 * EDGE)),
+            rod(EDGE, HANDLE, 3e-3),
+        ],
+        Instrument::Elevator => vec![ball(BLUNT), rod(0.0, HANDLE, 1.5e-3)],
+        Instrument::Forceps | Instrument::Hook => vec![ball(1.5e-3), rod(0.0, HANDLE, 1.2e-3)],
+        Instrument::Perforator | Instrument::Burr | Instrument::Craniotome => {
+            let bit = bit(instrument).unwrap_or(Bit::BURR);
+            let end = bit.length + 2.0 * bit.radius;
+            vec![ball(bit.radius), rod(0.0, end, bit.radius), rod(end, HANDLE, 6e-3)]
+        }
+    };
+    SharedShape::compound(parts)
+}
