@@ -3,10 +3,13 @@
 //! An interaction only reads its two objects. What it finds goes to a [`ContactSink`], and the
 //! objects' next updates add it up (§5.6).
 
+mod bone_nodes;
+mod burr;
 mod contact;
 mod impulses;
 mod nodes;
 mod penalty;
+mod piece;
 mod rules;
 mod shape;
 mod touches;
@@ -17,10 +20,13 @@ use crate::geometry::LANES;
 use crate::object::Object;
 use crate::stages::Stages;
 
+pub use bone_nodes::NodesInBone;
+pub use burr::{BurrForce, BurrInBone};
 pub use contact::{Contact, ContactBuffer, ContactSink, TableFull};
 pub use impulses::Impulses;
 pub use nodes::NodeSpheres;
 pub use penalty::{Penalty, PenaltyError};
+pub use piece::{PieceInBone, PieceOnBone};
 pub(crate) use rules::group_set;
 pub use rules::{InteractionPair, RuleError, Rules};
 pub use shape::NodesInShape;
