@@ -2,9 +2,12 @@
 
 mod abreast;
 pub(crate) mod batch;
+mod bone;
+pub mod drill;
 mod fixed;
 mod instrument;
 mod mass_spring;
+pub mod piece;
 mod pull;
 mod scripted;
 #[allow(unsafe_code)]
@@ -16,12 +19,14 @@ use std::hash::Hasher;
 
 use glam::Vec3;
 
+use self::drill::{Burr, Erosions};
 use crate::geometry::Geometry;
 use crate::interaction::Contact;
 use crate::message::Message;
 use crate::object::{Object, ObjectId};
 use crate::simd::Simd;
 
+pub use bone::Bone;
 pub use fixed::Fixed;
 pub use instrument::Instrument;
 pub use mass_spring::{MassSpring, MassSpringError};
@@ -39,6 +44,16 @@ pub trait Behavior: Any + Send + Sync {
     /// Whether the object is scenery: it is never updated, and told of no contacts.
     fn is_fixed(&self) -> bool {
         false
+    }
+
+    /// The bit that a tool is drilling with, if it is a drill; by default it is none.
+    fn burr(&self, _geometry: &Geometry) -> Option<Burr> {
+        None
+    }
+
+    /// Where bits put down what they take away, if this is bone; by default it is none.
+    fn erosions(&mut self) -> Option<&mut Erosions> {
+        None
     }
 
     /// Adds what this behaviour remembers from frame to frame to the state hash.

@@ -18,7 +18,7 @@ pub use rigid::Rigid;
 pub(crate) use topology::Slot;
 pub use topology::{Spring, Topology, TopologyError, edges};
 pub use vectors::{LANES, Lanes, Vectors};
-pub use volume::{BRICK_SIDE, BRICK_VOXELS, Brick, Volume, VolumeError, Voxel};
+pub use volume::{BRICK_SIDE, BRICK_VOXELS, Brick, Part, Volume, VolumeError, Voxel};
 
 /// An object's shape and place.
 #[derive(Clone)]

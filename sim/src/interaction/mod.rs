@@ -4,11 +4,14 @@
 //! objects' next updates add it up (§5.6).
 
 mod attachment;
+mod bone_nodes;
+mod burr;
 mod compliant;
 mod contact;
 mod impulses;
 mod nodes;
 mod penalty;
+mod piece;
 mod rules;
 mod shape;
 mod touches;
@@ -20,11 +23,14 @@ use crate::object::Object;
 use crate::stages::Stages;
 
 pub use attachment::{Attached, Link};
+pub use bone_nodes::NodesInBone;
+pub use burr::{BurrForce, BurrInBone};
 pub use compliant::{Compliant, CompliantError};
 pub use contact::{Contact, ContactBuffer, ContactSink, TableFull};
 pub use impulses::Impulses;
 pub use nodes::NodeSpheres;
 pub use penalty::{Penalty, PenaltyError};
+pub use piece::{PieceInBone, PieceOnBone};
 pub(crate) use rules::group_set;
 pub use rules::{InteractionPair, RuleError, Rules};
 pub use shape::NodesInShape;

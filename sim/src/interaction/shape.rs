@@ -50,10 +50,10 @@ fn behind_plane(mesh: &Mesh, point: Vec3, normal: Vec3, touches: &mut Touches) {
 }
 
 /// The search for a mesh's nodes in a box.
-struct Select<'a> {
-    mesh: &'a Mesh,
-    bounds: Bounds,
-    near: &'a mut NearNodes,
+pub(super) struct Select<'a> {
+    pub(super) mesh: &'a Mesh,
+    pub(super) bounds: Bounds,
+    pub(super) near: &'a mut NearNodes,
 }
 
 impl Kernel for Select<'_> {

@@ -12,7 +12,8 @@ pub struct Touch {
     pub nodes: [u32; 2],
     /// The unit normal of the contact, from the second object to the first.
     pub normal: [f32; 3],
-    /// How deep the objects are in each other, in metres.
+    /// How deep the objects are in each other, in metres; less than 0 where they are so far apart and are
+    /// about to touch.
     pub depth: f32,
 }
 

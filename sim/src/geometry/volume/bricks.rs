@@ -161,6 +161,25 @@ impl Bricks {
         self.voxels[brick][slot(voxel)]
     }
 
+    /// The densities of a row of voxels, as far as they lie in bricks that are not empty: each part's first
+    /// voxel along x, and its densities.
+    pub(super) fn row(
+        &self,
+        xs: Range<u32>,
+        y: u32,
+        z: u32,
+    ) -> impl Iterator<Item = (u32, &[u8])> + use<'_> {
+        let bricks = xs.start / BRICK_SIDE..xs.end.div_ceil(BRICK_SIDE);
+        bricks.filter_map(move |along| {
+            let first = xs.start.max(along * BRICK_SIDE);
+            let end = xs.end.min((along + 1) * BRICK_SIDE);
+            let brick = self.layout.brick([first, y, z].map(|index| index / BRICK_SIDE));
+            let start = slot([first, y, z]);
+            let there = self.headers[brick].peak > 0;
+            there.then(|| (first, &self.voxels[brick][start..start + (end - first) as usize]))
+        })
+    }
+
     pub(super) fn changed_since(&self, revision: u64) -> impl Iterator<Item = Brick<'_>> {
         // Most often nothing has changed, and a volume may have many thousand bricks.
         let headers = if self.revision > revision { self.headers.as_slice() } else { &[] };

@@ -2,6 +2,8 @@
 
 mod ball;
 mod bricks;
+mod parts;
+mod split;
 #[cfg(test)]
 mod tests;
 
@@ -15,6 +17,7 @@ use super::bounds::Bounds;
 
 pub use self::ball::Voxel;
 pub use self::bricks::{BRICK_SIDE, BRICK_VOXELS, Brick};
+pub use self::parts::Part;
 
 /// Why a volume cannot be built.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
@@ -179,7 +182,7 @@ impl Volume {
         let at = self.in_voxels(point);
         let along = |axis: Vec3| self.interpolated(at + axis) - self.interpolated(at - axis);
         let difference = Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z));
-        turn(&self.pose, difference / (self.spacing * 2.0), 1.0)
+        self.turned(difference / (self.spacing * 2.0))
     }
 
     /// Shows every voxel that overlaps a ball around a point, in a fixed order. Point and radius are in
@@ -244,13 +247,48 @@ impl Volume {
     /// A point (metres) in the volume's own axes.
     #[must_use]
     pub fn to_local(&self, point: Vec3) -> Vec3 {
-        turn(&self.pose, point - self.pose.translation, -1.0)
+        self.turned_back(point - self.pose.translation)
     }
 
     /// Where a point in the volume's own axes is, in metres.
     #[must_use]
     pub fn to_world(&self, local: Vec3) -> Vec3 {
-        turn(&self.pose, local, 1.0) + self.pose.translation
+        self.turned(local) + self.pose.translation
+    }
+
+    /// A direction along the volume's own axes, in the world's.
+    #[must_use]
+    pub fn turned(&self, local: Vec3) -> Vec3 {
+        turn(&self.pose, local, 1.0)
+    }
+
+    /// A direction of the world's, in the volume's own axes.
+    #[must_use]
+    pub fn turned_back(&self, direction: Vec3) -> Vec3 {
+        turn(&self.pose, direction, -1.0)
+    }
+
+    /// A direction as a volume of some pose would turn it.
+    pub(crate) fn turned_by(pose: &Pose, local: Vec3) -> Vec3 {
+        turn(pose, local, 1.0)
+    }
+
+    /// The density of a voxel, of 255; 0 outside the grid.
+    #[must_use]
+    pub fn density(&self, voxel: [i32; 3]) -> u8 {
+        self.bricks.get(voxel)
+    }
+
+    /// The volume of a voxel, in cubic metres.
+    #[must_use]
+    pub fn voxel_volume(&self) -> f32 {
+        self.spacing.element_product()
+    }
+
+    /// The densities of a row of voxels, where there are any: each part's first voxel along x, and its
+    /// densities.
+    pub(crate) fn row(&self, y: u32, z: u32) -> impl Iterator<Item = (u32, &[u8])> + use<'_> {
+        self.bricks.row(0..self.dims()[0], y, z)
     }
 
     /// Becomes a copy of another volume, by the bricks that differ; gives up no memory unless sizes do.

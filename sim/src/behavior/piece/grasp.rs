@@ -1,0 +1,177 @@
+//! How tools hold a piece.
+
+use std::any::Any;
+use std::hash::Hasher;
+
+use glam::{Mat3, Vec3};
+
+use super::Piece;
+use super::body::Body;
+use crate::geometry::Volume;
+use crate::message::Custom;
+use crate::object::{Object, ObjectId};
+
+/// A message to a piece: a tool takes hold of it. What is no piece, or has no bone there, ignores it; a
+/// tool that holds it already takes hold anew.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grasp {
+    /// The tool.
+    pub by: ObjectId,
+    /// Where, in metres. The point is held there until [`Hold`] says where to.
+    pub point: [f32; 3],
+    /// Within how many metres of the point there must be bone; usually 0.003.
+    pub radius: f32,
+    /// Of the hold, in newtons per metre; usually 1,000. Any stiffness is stable.
+    pub stiffness: f32,
+    /// The greatest force that the hold bears, in newtons; usually 20.
+    pub strength: f32,
+}
+
+/// A message to a piece: a tool that holds it moves the place held.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hold {
+    /// The tool.
+    pub by: ObjectId,
+    /// To where, in metres.
+    pub position: [f32; 3],
+}
+
+/// A message to a piece: a tool lets go of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LetGo {
+    /// The tool.
+    pub by: ObjectId,
+}
+
+impl Custom for Grasp {
+    fn process(&self, object: &mut Object) {
+        let Some(volume) = object.geometry.as_volume() else { return };
+        let hand = Hand::new(self, volume);
+        if let (Some(piece), Some(hand)) = (piece(&mut *object.behavior), hand) {
+            piece.hands.take(hand);
+        }
+    }
+}
+
+impl Custom for Hold {
+    fn process(&self, object: &mut Object) {
+        if let Some(piece) = piece(&mut *object.behavior) {
+            piece.hands.hold(self.by, Vec3::from_array(self.position));
+        }
+    }
+}
+
+impl Custom for LetGo {
+    fn process(&self, object: &mut Object) {
+        if let Some(piece) = piece(&mut *object.behavior) {
+            piece.hands.let_go(self.by);
+        }
+    }
+}
+
+fn piece(behavior: &mut dyn Any) -> Option<&mut Piece> {
+    behavior.downcast_mut()
+}
+
+/// The tools that hold a piece, in the order of their numbers.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Hands(Vec<Hand>);
+
+/// A tool's hold: a spring of critical damping from a point of the piece to a place.
+#[derive(Clone, Copy, Debug)]
+struct Hand {
+    by: ObjectId,
+    /// The point held, in the volume's own axes, in metres.
+    grip: Vec3,
+    /// Where it is to be, in metres.
+    target: Vec3,
+    stiffness: f32,
+    strength: f32,
+}
+
+impl Hand {
+    fn new(grasp: &Grasp, volume: &Volume) -> Option<Self> {
+        let Grasp { by, point, radius, stiffness, strength } = *grasp;
+        let target = Vec3::from_array(point);
+        let positive = |value: f32| value > 0.0 && value.is_finite();
+        let mut there = false;
+        volume.visit(target, radius, |voxel| there |= voxel.density >= 128);
+        let valid = there && positive(stiffness) && positive(strength);
+        valid.then(|| Self { by, grip: volume.to_local(target), target, stiffness, strength })
+    }
+
+    /// The way from the point held to its place, in metres.
+    fn way(&self, volume: &Volume) -> Vec3 {
+        self.target - volume.to_world(self.grip)
+    }
+
+    /// Its force on a piece at rest, in newtons.
+    fn force(&self, volume: &Volume) -> Vec3 {
+        (self.way(volume) * self.stiffness).clamp_length_max(self.strength)
+    }
+
+    /// Pulls for a frame of `time` seconds, by one implicit step, which any stiffness bears: a soft constraint
+    /// (E. Catto, "Soft constraints", GDC 2011).
+    fn pull(&self, body: &mut Body, volume: &Volume, time: f32) {
+        let at = volume.to_world(self.grip) - body.center(volume);
+        let inertia = body.inverse_inertia(volume);
+        let damping = 2.0 * (self.stiffness * body.mass).sqrt();
+        let softness = 1.0 / (time * (damping + time * self.stiffness));
+        let speed = body.velocity + body.angular_velocity(volume).cross(at);
+        let wanted = self.way(volume) * (time * self.stiffness * softness);
+        // The velocity at the point that an impulse along each axis gives.
+        let answer = |axis: Vec3| {
+            let along = axis * (body.inverse_mass() + softness);
+            along + (inertia * at.cross(axis)).cross(at)
+        };
+        let answers = Mat3::from_cols(answer(Vec3::X), answer(Vec3::Y), answer(Vec3::Z));
+        let impulse = answers.inverse() * (wanted - speed);
+        body.push(impulse.clamp_length_max(self.strength * time), at);
+    }
+}
+
+impl Hands {
+    fn take(&mut self, hand: Hand) {
+        match self.0.binary_search_by_key(&hand.by, |hand| hand.by) {
+            Ok(place) => self.0[place] = hand,
+            Err(place) => self.0.insert(place, hand),
+        }
+    }
+
+    fn hold(&mut self, by: ObjectId, target: Vec3) {
+        if let Some(hand) = self.0.iter_mut().find(|hand| hand.by == by && target.is_finite()) {
+            hand.target = target;
+        }
+    }
+
+    fn let_go(&mut self, by: ObjectId) {
+        self.0.retain(|hand| hand.by != by);
+    }
+
+    /// The tools, in ascending order.
+    pub(super) fn holders(&self) -> impl Iterator<Item = ObjectId> + '_ {
+        self.0.iter().map(|hand| hand.by)
+    }
+
+    /// Their force on a piece at rest, in newtons.
+    pub(super) fn force(&self, volume: &Volume) -> Vec3 {
+        self.0.iter().map(|hand| hand.force(volume)).sum()
+    }
+
+    /// Lets them pull for a frame of `time` seconds.
+    pub(super) fn pull(&self, body: &mut Body, volume: &Volume, time: f32) {
+        if body.mass > 0.0 {
+            self.0.iter().for_each(|hand| hand.pull(body, volume, time));
+        }
+    }
+
+    pub(super) fn hash_state(&self, hasher: &mut dyn Hasher) {
+        for hand in &self.0 {
+            hasher.write(&hand.by.0.to_le_bytes());
+            let places = hand.grip.to_array().into_iter().chain(hand.target.to_array());
+            for value in places.chain([hand.stiffness, hand.strength]) {
+                hasher.write(&value.to_le_bytes());
+            }
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! A free piece of bone on bone.
+
+use std::any::Any;
+
+use glam::{Mat3, Vec3};
+
+use super::bone_nodes::in_bone;
+use super::contact::Contact;
+use super::impulses::Impulses;
+use super::touches::{Touch, Touches};
+use super::{Detection, Response};
+use crate::behavior::piece::{MOST_SAMPLES, Piece};
+use crate::geometry::Volume;
+use crate::object::Object;
+
+/// Finds where a free piece of bone touches other bone, or is about to within a frame. The pair's first
+/// object is the piece ([`Piece`]), the second a volume.
+///
+/// The piece is looked at by points on its surface, each of which reaches half a voxel, and goes along
+/// with it for a frame in steps of a voxel; a touch's node is the point's number, its depth less than 0 by
+/// how far it has to go yet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PieceInBone {
+    /// How far it looks ahead, in seconds: the time of a frame.
+    pub time_step: f32,
+}
+
+impl Detection for PieceInBone {
+    fn detect(&self, first: &Object, second: &Object, touches: &mut Touches) {
+        let Some((piece, own)) = free_piece(first) else { return };
+        let Some(bone) = second.geometry.as_volume() else { return };
+        let center = piece.body().center(own);
+        let spin = piece.body().angular_velocity(own);
+        for (number, &sample) in piece.samples().iter().enumerate() {
+            let place = own.to_world(sample);
+            let way = (piece.body().velocity + spin.cross(place - center)) * self.time_step;
+            let Some((gap, normal)) = way_to(bone, place, way) else { continue };
+            // A point that was drilled away stands for nothing any more.
+            if own.density_at(place) > 0.25 {
+                let depth = 0.5 * own.spacing().min_element() - gap;
+                let nodes = [number as u32, Contact::BODY];
+                touches.push(Touch { nodes, normal: normal.to_array(), depth });
+            }
+        }
+    }
+}
+
+/// How far from the surface a point is along its normal, where it is inside already or comes to it on its
+/// way, and the normal.
+fn way_to(bone: &Volume, place: Vec3, way: Vec3) -> Option<(f32, Vec3)> {
+    let step = bone.spacing().min_element();
+    // As an integer, what is not a number becomes 0.
+    let steps = (way.length() / step).ceil() as u32;
+    for number in 0..=steps {
+        let point = place + way * (number as f32 / steps.max(1) as f32);
+        if bone.density_at(point) < 0.5 {
+            continue;
+        }
+        let (depth, normal) = in_bone(bone, point)?;
+        return Some(((place - point).dot(normal) - depth, normal));
+    }
+    None
+}
+
+fn free_piece(object: &Object) -> Option<(&Piece, &Volume)> {
+    let behavior: &dyn Any = &*object.behavior;
+    let piece = behavior.downcast_ref::<Piece>().filter(|piece| !piece.is_seated())?;
+    Some((piece, object.geometry.as_volume()?))
+}
+
+/// Holds a piece off bone that stands still: impulses that let none of its points go farther in, with
+/// Coulomb's friction and without rebound; a point that is inside already is let out slowly.
+///
+/// They are found by sequential impulses (E. Catto, "Iterative dynamics with temporal coherence", GDC
+/// 2005) from the velocity that the piece has with what gravity and hands will do to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PieceOnBone {
+    /// The coefficient of friction; usually 0.4.
+    pub friction: f32,
+}
+
+/// Rounds over all points; usually 12.
+const ROUNDS: usize = 12;
+/// The share of its depth by which a point comes out in a frame; usually 0.2.
+const COME_OUT: f32 = 0.2;
+/// The depth that is let be, in metres; usually 20 µm, so that what lies still keeps touching.
+const LET_BE: f32 = 2e-5;
+/// How fast a point comes out at most, in metres per second; usually 0.05.
+const FASTEST_OUT: f32 = 0.05;
+
+impl Response for PieceOnBone {
+    fn respond(
+        &self,
+        bodies: [&Object; 2],
+        touches: &Touches,
+        time_step: f32,
+        [on_piece, on_bone]: [&mut Impulses; 2],
+    ) {
+        let Some((piece, volume)) = free_piece(bodies[0]) else { return };
+        let mut motion = Motion::new(piece, volume);
+        let center = piece.body().center(volume);
+        let mut points = [Point::default(); MOST_SAMPLES];
+        let points = &mut points[..touches.list().len().min(MOST_SAMPLES)];
+        for (point, touch) in points.iter_mut().zip(touches.list()) {
+            let Some(&sample) = piece.samples().get(touch.nodes[0] as usize) else { continue };
+            *point = Point::new(touch, volume.to_world(sample) - center, &motion, time_step);
+        }
+        for _ in 0..ROUNDS {
+            points.iter_mut().for_each(|point| point.push(&mut motion, self.friction));
+        }
+        for (point, touch) in points.iter().zip(touches.list()) {
+            let impulse = point.normal * point.pressed + point.rubbed;
+            if impulse != Vec3::ZERO {
+                on_piece.add(touch.nodes[0], impulse.to_array());
+                on_bone.add(Contact::BODY, (-impulse).to_array());
+            }
+        }
+    }
+}
+
+/// How the piece moves with the impulses found so far.
+struct Motion {
+    velocity: Vec3,
+    spin: Vec3,
+    inverse_mass: f32,
+    inverse_inertia: Mat3,
+}
+
+impl Motion {
+    fn new(piece: &Piece, volume: &Volume) -> Self {
+        let body = piece.body();
+        Self {
+            velocity: body.velocity,
+            spin: body.angular_velocity(volume),
+            inverse_mass: body.inverse_mass(),
+            inverse_inertia: body.inverse_inertia(volume),
+        }
+    }
+
+    fn at(&self, place: Vec3) -> Vec3 {
+        self.velocity + self.spin.cross(place)
+    }
+
+    fn push(&mut self, impulse: Vec3, place: Vec3) {
+        self.velocity += impulse * self.inverse_mass;
+        self.spin += self.inverse_inertia * place.cross(impulse);
+    }
+
+    /// The mass that answers an impulse along a unit vector at a place, in kilograms.
+    fn mass(&self, place: Vec3, along: Vec3) -> f32 {
+        let arm = place.cross(along);
+        let answer = self.inverse_mass + arm.dot(self.inverse_inertia * arm);
+        if answer > 0.0 { 1.0 / answer } else { 0.0 }
+    }
+}
+
+/// A point of the piece that touches bone.
+#[derive(Clone, Copy, Default)]
+struct Point {
+    /// From the centre of mass, in metres.
+    place: Vec3,
+    normal: Vec3,
+    mass: f32,
+    /// The least velocity along the normal that it may have, in metres per second.
+    least: f32,
+    /// The impulse along the normal, in newton seconds.
+    pressed: f32,
+    /// That of friction.
+    rubbed: Vec3,
+}
+
+impl Point {
+    fn new(touch: &Touch, place: Vec3, motion: &Motion, time_step: f32) -> Self {
+        let normal = Vec3::from_array(touch.normal);
+        let least = if touch.depth < 0.0 {
+            touch.depth / time_step
+        } else {
+            (COME_OUT * (touch.depth - LET_BE).max(0.0) / time_step).min(FASTEST_OUT)
+        };
+        let mass = motion.mass(place, normal);
+        Self { place, normal, mass, least, ..Self::default() }
+    }
+
+    fn push(&mut self, motion: &mut Motion, friction: f32) {
+        let off = motion.at(self.place).dot(self.normal) - self.least;
+        let pressed = (self.pressed - self.mass * off).max(0.0);
+        motion.push(self.normal * (pressed - self.pressed), self.place);
+        self.pressed = pressed;
+        let velocity = motion.at(self.place);
+        let slip = velocity - self.normal * velocity.dot(self.normal);
+        let rubbed = (self.rubbed - slip * self.mass).clamp_length_max(friction * self.pressed);
+        motion.push(rubbed - self.rubbed, self.place);
+        self.rubbed = rubbed;
+    }
+}
