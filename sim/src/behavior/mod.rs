@@ -13,6 +13,7 @@ mod scripted;
 #[allow(unsafe_code)]
 mod spring_kernel;
 mod spring_law;
+pub mod tissue;
 
 use std::any::Any;
 use std::hash::Hasher;
@@ -32,6 +33,7 @@ pub use instrument::Instrument;
 pub use mass_spring::{MassSpring, MassSpringError};
 pub use scripted::{Keyframe, ScriptError, Scripted};
 pub use spring_kernel::Springs;
+pub use tissue::Tissue;
 
 /// How an object changes from frame to frame.
 pub trait Behavior: Any + Send + Sync {

@@ -94,6 +94,11 @@ impl Mesh {
         &self.masses.as_flattened()[..self.topology.nodes()]
     }
 
+    /// The nodes' inverse masses, in 1/kg; 0 for a node that is held fast.
+    pub(crate) fn inverse_masses(&self) -> &[f32] {
+        &self.inverse_masses.as_flattened()[..self.topology.nodes()]
+    }
+
     /// The radius of each node's contact sphere, in metres.
     #[must_use]
     pub fn contact_radius(&self) -> f32 {

@@ -1,6 +1,7 @@
 //! The geometry module of an object (Fig. 2): what it is shaped like and where it is.
 
 mod bounds;
+mod cut;
 mod icosphere;
 mod mesh;
 mod rigid;
@@ -11,6 +12,8 @@ mod volume;
 use glam::Vec3;
 
 pub use bounds::Bounds;
+pub use cut::Blade;
+pub(crate) use cut::{Birth, CutNode, CutSurface, Sweep};
 pub use icosphere::{ICOSPHERE_EDGES, ICOSPHERE_FACES, ICOSPHERE_NODES, icosphere};
 pub(crate) use mesh::KernelParts;
 pub use mesh::{Mesh, MeshError};
