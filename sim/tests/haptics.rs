@@ -2,6 +2,7 @@
 //! beside it that has a rate and a delay of its own.
 
 use std::collections::VecDeque;
+use std::sync::OnceLock;
 
 use dualframe_sim::device::DeviceSample;
 use dualframe_sim::device::law::ForceSettings;
@@ -11,18 +12,36 @@ use dualframe_sim::device::motion::{Keyframe, Motion};
 use dualframe_sim::device::operator::{Hand, SimulatedDevice};
 use dualframe_sim::device::proxy::{ContactStiffness, Proxy, Surface};
 use dualframe_sim::device::thread::HapticLoop;
+use dualframe_sim::geometry::Volume;
 use glam::Vec3;
+use parry3d::math::Pose;
 
 /// The radius of the round bone, in metres: a skull's.
 const SKULL: f32 = 0.07;
 /// The period of the loop, in seconds.
 const PERIOD: f64 = 1e-3;
 
-/// A flat bone below y = 0, and a round one whose top is there.
+/// A flat bone below y = 0, a round one whose top is there, and a round one of voxels.
 #[derive(Clone, Copy, Debug)]
 enum Bone {
     Flat,
     Round,
+    Voxels,
+}
+
+/// The round bone in voxels of half a millimetre, filled in part at the surface, as of a CT.
+fn voxels() -> &'static Volume {
+    static VOXELS: OnceLock<Volume> = OnceLock::new();
+    VOXELS.get_or_init(|| {
+        let (spacing, corner) = (0.000_5, Vec3::new(-0.02, -0.02, -0.020_1));
+        let filled = |[x, y, z]: [u32; 3]| {
+            let middle = Vec3::new(x as f32, y as f32, z as f32) + Vec3::splat(0.5);
+            let (distance, _) = Bone::Round.distance(corner + middle * spacing);
+            (255.0 * (0.5 - distance / spacing).clamp(0.0, 1.0)).round() as u8
+        };
+        let pose = Pose::from_translation(corner);
+        Volume::from_fn([120, 44, 80], Vec3::splat(spacing), pose, filled).expect("small")
+    })
 }
 
 impl Surface for Bone {
@@ -33,6 +52,7 @@ impl Surface for Bone {
                 let from_centre = point + Vec3::Y * SKULL;
                 (from_centre.length() - SKULL, from_centre.normalize_or(Vec3::Y))
             }
+            Self::Voxels => voxels().distance(point),
         }
     }
 }
@@ -159,7 +179,8 @@ fn closed_loop_is_passive_and_smooth() {
         air.stiffness = ContactStiffness::new(0.0);
         let fastest_in_air =
             fastest(&run(SimulatedDevice::new(hand, pressing()), air, settings, 4.0));
-        for (bone, (rate, delay)) in PIPELINES.map(|p| [(Bone::Flat, p), (Bone::Round, p)]).concat()
+        for (bone, (rate, delay)) in
+            PIPELINES.map(|p| [Bone::Flat, Bone::Round, Bone::Voxels].map(|b| (b, p))).concat()
         {
             let case = format!("{hand:?}, {bone:?}, {rate} Hz, {delay} s");
             let device = SimulatedDevice::new(hand, pressing());
@@ -195,12 +216,17 @@ fn without_the_limiter_the_loop_is_unstable() {
 fn fades_when_the_pipeline_is_held_up() {
     let settings = ForceSettings::default();
     let held_up = [3.0, 3.2];
-    for hand in [Hand::LIGHT, Hand::FIRM] {
+    for (hand, bone) in [
+        (Hand::LIGHT, Bone::Flat),
+        (Hand::FIRM, Bone::Flat),
+        (Hand::LIGHT, Bone::Voxels),
+        (Hand::FIRM, Bone::Voxels),
+    ] {
         for (rate, delay) in PIPELINES {
-            let case = format!("{hand:?}, {rate} Hz, {delay} s");
+            let case = format!("{hand:?}, {bone:?}, {rate} Hz, {delay} s");
             let keyframes = [keyframe(0.2, 0.0, 0.01), keyframe(0.6, 0.0, -0.005)];
             let device = SimulatedDevice::new(hand, Motion::new(keyframes).expect("in order"));
-            let pipeline = Pipeline { held_up, ..Pipeline::new(Bone::Flat, rate, delay) };
+            let pipeline = Pipeline { held_up, ..Pipeline::new(bone, rate, delay) };
             let seen = run(device, pipeline, settings, 6.0);
             let during =
                 |from: f64, to: f64| seen.iter().filter(move |s| from < s.time && s.time < to);

@@ -14,6 +14,7 @@ mod scripted;
 mod spring_kernel;
 mod spring_law;
 pub mod tissue;
+mod tool;
 
 use std::any::Any;
 use std::hash::Hasher;
@@ -34,6 +35,7 @@ pub use mass_spring::{MassSpring, MassSpringError};
 pub use scripted::{Keyframe, ScriptError, Scripted};
 pub use spring_kernel::Springs;
 pub use tissue::Tissue;
+pub use tool::{Tool, Work, Workpieces};
 
 /// How an object changes from frame to frame.
 pub trait Behavior: Any + Send + Sync {

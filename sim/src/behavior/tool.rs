@@ -94,7 +94,11 @@ pub struct Tool {
 impl Tool {
     /// A tool and its shape at a place; it can work on `workpieces`.
     #[must_use]
-    pub fn new(instrument: Instrument, device: DeviceSample, workpieces: Workpieces) -> (Rigid, Self) {
+    pub fn new(
+        instrument: Instrument,
+        device: DeviceSample,
+        workpieces: Workpieces,
+    ) -> (Rigid, Self) {
         let shapes = Instrument::ALL.map(shape);
         let pose = Pose::from_parts(device.position, device.orientation);
         let rigid = Rigid::new(shapes[instrument as usize].clone(), pose);
@@ -213,7 +217,8 @@ impl Tool {
             (false, true) => {
                 let hook = self.instrument == Instrument::Hook;
                 let strength = if hook { HOOK_STRENGTH } else { FORCEPS_STRENGTH };
-                let grasp = || tissue::Grasp { by, point: at, radius: REACH, stiffness: HOLD, strength };
+                let grasp =
+                    || tissue::Grasp { by, point: at, radius: REACH, stiffness: HOLD, strength };
                 tell(input, tissue, grasp);
                 let [stiffness, strength] = BONE_HOLD;
                 let (point, radius) = (at.to_array(), REACH);
@@ -338,7 +343,10 @@ fn shape(instrument: Instrument) -> SharedShape {
     };
     let parts = match instrument {
         Instrument::Scalpel => vec![
-            (Pose::from_translation(Vec3::Z * (0.5 * EDGE)), SharedShape::cuboid(3e-4, 2e-3, 0.5 * EDGE)),
+            (
+                Pose::from_translation(Vec3::Z * (0.5 * EDGE)),
+                SharedShape::cuboid(3e-4, 2e-3, 0.5 * EDGE),
+            ),
             rod(EDGE, HANDLE, 3e-3),
         ],
         Instrument::Elevator => vec![ball(BLUNT), rod(0.0, HANDLE, 1.5e-3)],

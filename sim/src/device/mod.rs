@@ -21,6 +21,7 @@
 //! Positions are in metres, forces in newtons, torques in newton metres, times in seconds on the haptic
 //! loop's own clock, which begins with the loop.
 
+mod bone;
 pub mod entry;
 pub mod figures;
 pub mod law;

@@ -22,7 +22,7 @@ const STEPS: usize = 8;
 const TOLERANCE: f32 = 1e-6;
 /// How far from the surface a tool may be for a model of the gap, in metres. Usually 0.02: at 0.5 m/s
 /// it is not reached within two frames of 1/60 s.
-const REACH: f32 = 0.02;
+pub(super) const REACH: f32 = 0.02;
 
 /// A closed or an endless surface: positive outside, negative inside.
 pub trait Surface {

@@ -1,6 +1,7 @@
 //! Environments ready to run.
 
 mod bone;
+pub mod craniotomy;
 mod particles;
 mod random;
 

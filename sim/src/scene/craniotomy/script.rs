@@ -56,7 +56,8 @@ impl Script {
     pub(super) fn stroke(&mut self, hand: usize, stroke: &Stroke) {
         let &Stroke { instrument, axis, speed, pressed, .. } = stroke;
         let (orientation, buttons) = (upright_to(axis), u32::from(pressed));
-        let cue = |position| Cue { sample: DeviceSample { position, orientation, buttons }, instrument };
+        let cue =
+            |position| Cue { sample: DeviceSample { position, orientation, buttons }, instrument };
         let step = speed * self.time_step;
         self.hands[hand].extend(even_steps(&stroke.path, step).map(cue));
     }
@@ -160,9 +161,11 @@ mod tests {
                 told.push((swapped + AHEAD, to.0, switch));
             });
         }
-        let switches: Vec<_> = told.iter().filter(|told| told.2).map(|told| (told.0, told.1)).collect();
+        let switches: Vec<_> =
+            told.iter().filter(|told| told.2).map(|told| (told.0, told.1)).collect();
         assert_eq!(switches, [(2, 0), (2, 1), (8, 0)]);
-        let places: Vec<_> = told.iter().filter(|told| !told.2).map(|told| (told.0, told.1)).collect();
+        let places: Vec<_> =
+            told.iter().filter(|told| !told.2).map(|told| (told.0, told.1)).collect();
         // 5 points, rest until the switch, whose first place is also the last one's, then 4 more.
         assert_eq!(places, [(2, 0), (2, 1), (3, 0), (4, 0), (9, 0), (10, 0), (11, 0), (12, 0)]);
     }

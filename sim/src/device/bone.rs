@@ -1,0 +1,118 @@
+//! Voxel bone as a surface for the proxy.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+
+use super::proxy::{REACH, Surface};
+use crate::behavior::drill::Overlap;
+use crate::geometry::Volume;
+
+/// The radius of the ball by which bone is felt, in voxels; usually 3: a normal is then true to a degree
+/// or so, which differences from voxel to voxel are not.
+const BALL: f32 = 3.0;
+/// The share of the ball that must be bone, and must be none, to tell how far the surface is; usually
+/// 0.001.
+const LEAST_SHARE: f32 = 0.001;
+/// Newton steps; usually 12.
+const STEPS: usize = 12;
+
+/// Voxel bone, whose surface is where half of a ball around a point is bone.
+///
+/// As long as the ball meets the surface, how much of it is bone says how far that is, and the centre of
+/// mass where. Farther out it is looked for along the axes and the diagonals: the plane through the
+/// nearest place where one of them meets bone stands for it. Where none does, and deep inside, nothing is
+/// known but the side: the distance is infinite, and has no gradient.
+impl Surface for Volume {
+    fn distance(&self, point: Vec3) -> (f32, Vec3) {
+        let radius = BALL * self.spacing().max_element();
+        let overlap = Overlap::new(self, point, radius, Vec3::Z, 0.0);
+        let share = overlap.volume / (FRAC_4_PI_3 * radius * radius * radius);
+        let seen = if share < LEAST_SHARE {
+            nearest(self, point)
+        } else if share > 1.0 - LEAST_SHARE {
+            None
+        } else {
+            overlap.normal(None).map(|normal| (radius * half_space(share), normal))
+        };
+        seen.unwrap_or(((0.5 - share).signum() * f32::INFINITY, Vec3::ZERO))
+    }
+}
+
+/// The volume of a ball of radius 1.
+const FRAC_4_PI_3: f32 = 4.0 / 3.0 * PI;
+
+/// How far a ball's middle is outside a half-space that fills so much of the ball, as a share of its
+/// radius: x³ − 3x + 2 = 4·share, solved by Newton's method.
+fn half_space(share: f32) -> f32 {
+    let mut x = 0.0_f32;
+    for _ in 0..STEPS {
+        let value = x * x * x - 3.0 * x + 2.0 - 4.0 * share;
+        x = (x - value / (3.0 * x * x - 3.0)).clamp(-0.99, 0.99);
+    }
+    x
+}
+
+/// The plane of the surface that is nearest to a point outside: the distance to it, and its normal.
+fn nearest(bone: &Volume, point: Vec3) -> Option<(f32, Vec3)> {
+    let directions = (0..27).filter(|&number| number != 13).map(|number: i32| {
+        let along = [number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1];
+        Vec3::from_array(along.map(|component| component as f32)).normalize()
+    });
+    let hit = |direction: Vec3| Some((ray(bone, point, direction)?, direction));
+    let (way, direction) = directions.filter_map(hit).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let place = point + direction * way;
+    let radius = BALL * bone.spacing().max_element();
+    let normal = Overlap::new(bone, place, radius, Vec3::Z, 0.0).normal(None).unwrap_or(-direction);
+    Some(((point - place).dot(normal), normal))
+}
+
+/// How far a ray goes until it is in bone, in metres.
+fn ray(bone: &Volume, from: Vec3, direction: Vec3) -> Option<f32> {
+    let step = bone.spacing().min_element();
+    let steps = (REACH / step) as u32;
+    let ways = (1..=steps).map(|number| number as f32 * step);
+    let mut before = bone.density_at(from);
+    for way in ways {
+        let density = bone.density_at(from + direction * way);
+        if density >= 0.5 {
+            return Some(way - step * (density - 0.5) / (density - before));
+        }
+        before = density;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use parry3d::math::Pose;
+
+    use super::*;
+
+    /// A slab of bone up to y = 10 mm.
+    fn slab() -> Volume {
+        let filled = |[_, y, _]: [u32; 3]| if y < 10 { 255 } else { 0 };
+        Volume::from_fn([40; 3], Vec3::splat(0.001), Pose::IDENTITY, filled).expect("small")
+    }
+
+    #[test]
+    fn near_and_far_agree() {
+        let slab = slab();
+        for height in [-0.002, 0.000_1, 0.000_4, 0.002, 0.010, 0.0199] {
+            for x in [0.0151, 0.02, 0.0234] {
+                let (distance, normal) = slab.distance(Vec3::new(x, 0.01 + height, 0.02));
+                assert!((distance - height).abs() < 2e-4, "{distance} at {height}");
+                assert!(normal.distance(Vec3::Y) < 1e-3, "{normal} at {height}");
+            }
+        }
+    }
+
+    #[test]
+    fn out_of_reach_and_deep_inside_only_the_side_is_known() {
+        let slab = slab();
+        let out = slab.distance(Vec3::new(0.02, 0.035, 0.02));
+        assert_eq!(out, (f32::INFINITY, Vec3::ZERO));
+        let inside = slab.distance(Vec3::new(0.02, 0.004, 0.02));
+        assert_eq!(inside, (f32::NEG_INFINITY, Vec3::ZERO));
+    }
+}

@@ -1,0 +1,250 @@
+//! A tool as each of its instruments.
+
+use std::sync::Mutex;
+
+use dualframe_sim::behavior::tissue::{Material, Pin, Tissue};
+use dualframe_sim::behavior::{Bone, Instrument, Tool, Workpieces};
+use dualframe_sim::device::DeviceSample;
+use dualframe_sim::executor::ExecutorKind;
+use dualframe_sim::geometry::Geometry;
+use dualframe_sim::interaction::{BurrForce, BurrInBone, InteractionPair, Rules};
+use dualframe_sim::manager::{Settings, VeManager};
+use dualframe_sim::message::Message;
+use dualframe_sim::object::{Group, Object, ObjectId};
+use dualframe_sim::render::NullRenderer;
+use dualframe_sim::scene::{Scene, bone_piece};
+use dualframe_sim::simd::Simd;
+use dualframe_sim::stages::Stages;
+use glam::Vec3;
+use parry3d::math::Pose;
+
+const TIME_STEP: f32 = 1.0 / 60.0;
+const TOOL: ObjectId = ObjectId(0);
+const OTHER: ObjectId = ObjectId(1);
+
+/// A tool at a place, upright, and another object that it can work on.
+fn manager(other: Object, at: Vec3, workpieces: Workpieces) -> VeManager {
+    let (rigid, tool) = Tool::new(Instrument::Forceps, DeviceSample::at(at), workpieces);
+    let tool = Object::new(TOOL, Group(0), Geometry::Rigid(rigid), tool);
+    let mut rules = Rules::new();
+    let pair = InteractionPair { detection: Box::new(BurrInBone), response: Box::new(BurrForce) };
+    rules.model(Group(0), Group(1), pair).expect("the groups exist");
+    let (gravity, simd) = (Vec3::ZERO, Simd::detect());
+    let stages = Stages { rules, time_step: TIME_STEP, gravity, callback_budget: None, simd };
+    let settings = Settings { executor: ExecutorKind::Serial, threads: 1, ..Settings::default() };
+    let scene = Scene::new(vec![tool, other], stages);
+    VeManager::new(scene, settings).expect("two objects can be run")
+}
+
+fn run(manager: &mut VeManager, frames: u64) {
+    manager.run(frames, &mut NullRenderer::new(), &mut |_| {}).expect("no table is full");
+}
+
+fn move_to(manager: &VeManager, position: Vec3, pressed: bool) {
+    let sample = DeviceSample { buttons: u32::from(pressed), ..DeviceSample::at(position) };
+    manager.mailbox().post(TOOL, Message::Device(sample));
+}
+
+fn take_up(manager: &VeManager, instrument: Instrument) {
+    manager.mailbox().post(TOOL, Message::TakeUp(instrument));
+}
+
+/// Reads something off an object.
+fn read<T>(manager: &VeManager, id: ObjectId, read: impl Fn(&Object) -> T) -> T {
+    let found = Mutex::new(None);
+    manager.visit(&mut |object| {
+        if object.id() == id {
+            *found.lock().expect("nobody panicked") = Some(read(object));
+        }
+    });
+    found.into_inner().expect("nobody panicked").expect("the object is there")
+}
+
+fn tip(manager: &VeManager) -> Vec3 {
+    read(manager, TOOL, |tool| tool.geometry.as_rigid().expect("a tool").pose.translation)
+}
+
+/// The middle of the bone piece's outer surface, and its thickness, in metres.
+const OUTER: Vec3 = Vec3::new(0.032, 0.032, 0.044);
+const THICKNESS: f32 = 0.007;
+
+fn bone() -> (Object, Workpieces) {
+    let volume = bone_piece(128, Pose::IDENTITY).expect("128 voxels are allowed");
+    let bone = Object::new(OTHER, Group(1), Geometry::Volume(volume), Bone::new());
+    (bone, Workpieces { bone: vec![OTHER], ..Workpieces::default() })
+}
+
+#[test]
+fn a_perforator_stops_at_the_inner_table() {
+    let (bone, workpieces) = bone();
+    let mut manager = manager(bone, OUTER + Vec3::Z * 0.005, workpieces);
+    take_up(&manager, Instrument::Perforator);
+    // The hand leans on it and would go on for centimetres.
+    move_to(&manager, OUTER - Vec3::Z * 0.03, true);
+    let mut seconds = 0;
+    let turns = |manager: &VeManager| {
+        read(manager, TOOL, |tool| Tool::of(tool).expect("a tool").work().turns)
+    };
+    run(&mut manager, 60);
+    assert!(turns(&manager), "it turns when it is pressed on bone");
+    while turns(&manager) {
+        run(&mut manager, 60);
+        seconds += 1;
+        assert!(seconds < 60, "it drills for a minute");
+    }
+    let past = OUTER.z - THICKNESS - tip(&manager).z;
+    assert!(
+        (-0.0015..0.001).contains(&past),
+        "it is {past} m past the inner table after {seconds} s"
+    );
+    // It stays there, and lets nothing be taken away.
+    let removed = |manager: &VeManager| {
+        read(manager, OTHER, |bone| {
+            let behavior: &dyn std::any::Any = &*bone.behavior;
+            behavior.downcast_ref::<Bone>().expect("bone").removed()
+        })
+    };
+    let before = removed(&manager);
+    run(&mut manager, 120);
+    let later = OUTER.z - THICKNESS - tip(&manager).z;
+    assert!(later < 0.001, "it is {later} m past the inner table after two seconds more");
+    assert!(removed(&manager) - before < 255 * 8, "it went on drilling");
+    // Without the button nothing turns, in bone or in air.
+    move_to(&manager, OUTER + Vec3::Z * 0.02, false);
+    run(&mut manager, 120);
+    assert!(!turns(&manager));
+    assert!(tip(&manager).distance(OUTER + Vec3::Z * 0.02) < 1e-4);
+}
+
+#[test]
+fn a_burr_drills_only_while_it_is_pressed() {
+    let (bone, workpieces) = bone();
+    let mut manager = manager(bone, OUTER + Vec3::Z * 0.005, workpieces);
+    take_up(&manager, Instrument::Burr);
+    let digest = |manager: &VeManager| {
+        read(manager, OTHER, |bone| bone.geometry.as_volume().expect("bone").digest())
+    };
+    let whole = digest(&manager);
+    move_to(&manager, OUTER - Vec3::Z * 0.004, false);
+    run(&mut manager, 60);
+    assert_eq!(digest(&manager), whole);
+    let depth = OUTER.z - tip(&manager).z;
+    assert!((0.0..0.001_5).contains(&depth), "it lies on the bone, {depth} m deep");
+    move_to(&manager, OUTER - Vec3::Z * 0.004, true);
+    run(&mut manager, 120);
+    assert_ne!(digest(&manager), whole);
+    assert!(OUTER.z - tip(&manager).z > 0.003);
+}
+
+/// A square patch of tissue at z = 0, 60 mm a side, pinned along its border.
+fn patch() -> (Object, Workpieces) {
+    const SIDE: u32 = 13;
+    let place = |x: u32, y: u32| Vec3::new(x as f32, y as f32, 0.0) * 0.005;
+    let node = |x: u32, y: u32| y * SIDE + x;
+    let rest: Vec<_> = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| place(x, y))).collect();
+    let squares = (0..SIDE - 1).flat_map(|y| (0..SIDE - 1).map(move |x| (x, y)));
+    let triangles = squares.flat_map(|(x, y)| {
+        let [a, b, c, d] = [node(x, y), node(x + 1, y), node(x, y + 1), node(x + 1, y + 1)];
+        [[a, b, d], [a, d, c]]
+    });
+    let material = Material {
+        stiffness: 1_000.0,
+        bending: 10.0,
+        to_center: 0.0,
+        damping: 5.0,
+        area_density: 5.0,
+    };
+    let is_border =
+        |node: u32| [node % SIDE, node / SIDE].iter().any(|&at| at == 0 || at == SIDE - 1);
+    let pins = (0..SIDE * SIDE).filter(|&node| is_border(node)).map(|node| Pin {
+        node,
+        point: rest[node as usize],
+        stiffness: 1_000.0,
+        strength: f32::INFINITY,
+    });
+    let (mesh, tissue) =
+        Tissue::new(&rest, triangles.collect(), material, 0.002, 16).expect("a sound patch");
+    let tissue = tissue.with_pins(pins.collect()).expect("pins of its own nodes");
+    let patch = Object::new(OTHER, Group(2), Geometry::Mesh(mesh), tissue);
+    (patch, Workpieces { tissue: vec![OTHER], ..Workpieces::default() })
+}
+
+const MIDDLE: Vec3 = Vec3::new(0.03, 0.03, 0.0);
+
+#[test]
+fn a_scalpel_cuts_only_while_it_is_pressed() {
+    for pressed in [false, true] {
+        let (patch, workpieces) = patch();
+        let deep = Vec3::Z * -0.004;
+        let mut manager = manager(patch, MIDDLE + Vec3::new(-0.013, 0.001, 0.0) + deep, workpieces);
+        take_up(&manager, Instrument::Scalpel);
+        let nodes = |manager: &VeManager| {
+            read(manager, OTHER, |patch| patch.geometry.as_mesh().expect("tissue").positions.len())
+        };
+        let whole = nodes(&manager);
+        for step in 0..40 {
+            let along = Vec3::new(-0.013 + 0.000_65 * step as f32, 0.001, 0.0);
+            move_to(&manager, MIDDLE + along + deep, pressed);
+            run(&mut manager, 1);
+        }
+        run(&mut manager, 4);
+        assert_eq!(nodes(&manager) > whole, pressed);
+    }
+}
+
+#[test]
+fn forceps_hold_until_they_open_and_are_put_away() {
+    for opens in [true, false] {
+        let (patch, workpieces) = patch();
+        let mut manager = manager(patch, MIDDLE, workpieces);
+        move_to(&manager, MIDDLE, true);
+        run(&mut manager, 3);
+        let height = |manager: &VeManager| {
+            read(manager, OTHER, |patch| {
+                let mesh = patch.geometry.as_mesh().expect("tissue");
+                mesh.positions.get(6 * 13 + 6).expect("the middle node").z
+            })
+        };
+        for step in 1..=60 {
+            move_to(&manager, MIDDLE + Vec3::Z * (0.000_15 * step as f32), true);
+            run(&mut manager, 1);
+        }
+        let lifted = height(&manager);
+        assert!(lifted > 0.004, "lifted by {lifted} m");
+        if opens {
+            move_to(&manager, MIDDLE + Vec3::Z * 0.009, false);
+        } else {
+            take_up(&manager, Instrument::Burr);
+        }
+        run(&mut manager, 240);
+        let left = height(&manager);
+        assert!(left < 0.1 * lifted, "{left} m are left of {lifted} m");
+    }
+}
+
+#[test]
+fn an_elevator_frees_what_it_scrapes() {
+    let (patch, workpieces) = patch();
+    let mut manager = manager(patch, Vec3::ZERO, workpieces);
+    take_up(&manager, Instrument::Elevator);
+    let pins = |manager: &VeManager| {
+        read(manager, OTHER, |patch| Tissue::of(patch).expect("tissue").pins().len())
+    };
+    let all = pins(&manager);
+    move_to(&manager, Vec3::ZERO, false);
+    run(&mut manager, 5);
+    assert_eq!(pins(&manager), all);
+    move_to(&manager, Vec3::ZERO, true);
+    run(&mut manager, 5);
+    assert_eq!(pins(&manager), all - 3);
+}
+
+#[test]
+fn poses_that_are_no_numbers_are_ignored() {
+    let (bone, workpieces) = bone();
+    let mut manager = manager(bone, Vec3::ZERO, workpieces);
+    move_to(&manager, Vec3::new(f32::NAN, 0.0, 0.0), true);
+    run(&mut manager, 3);
+    assert_eq!(tip(&manager), Vec3::ZERO);
+    assert!(manager.quarantined().is_empty());
+}
