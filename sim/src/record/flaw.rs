@@ -17,6 +17,9 @@ pub enum RecordError {
     /// It cannot be written.
     #[error("the recording cannot be written")]
     Write(#[from] io::Error),
+    /// It has failed before.
+    #[error("the session is no longer recorded")]
+    Over,
     /// The environment is not at its start.
     #[error("a recording begins before frame 0, and the environment is before frame {frame}")]
     Begun {
@@ -103,7 +106,6 @@ pub struct ReadError {
     /// Where.
     pub place: Place,
     /// What.
-    #[source]
     pub flaw: Flaw,
 }
 

@@ -20,9 +20,9 @@ pub(crate) struct Journal {
     payload: Vec<u8>,
     order: Order,
     totals: Totals,
-    /// Why nothing is taken down any more.
+    /// Whether nothing is taken down any more, and why, until that is told.
+    is_over: bool,
     fault: Option<RecordError>,
-    is_faulty: bool,
 }
 
 impl Journal {
@@ -31,8 +31,8 @@ impl Journal {
             payload: vec![0; FRAMES],
             order: Order::default(),
             totals: Totals::default(),
+            is_over: false,
             fault: None,
-            is_faulty: false,
         }
     }
 
@@ -68,7 +68,7 @@ impl Journal {
 
     /// Takes something down, whole or not at all.
     fn note(&mut self, frame: u64, note: impl FnOnce(&mut Self) -> Result<(), RecordError>) {
-        if self.is_faulty {
+        if self.is_over {
             return;
         }
         let before = self.payload.len();
@@ -78,7 +78,7 @@ impl Journal {
         }
         if let Err(fault) = noted {
             self.payload.truncate(before);
-            (self.fault, self.is_faulty) = (Some(fault), true);
+            (self.fault, self.is_over) = (Some(fault), true);
         }
     }
 
@@ -87,9 +87,17 @@ impl Journal {
         self.payload.len()
     }
 
-    /// Why nothing is taken down any more, if that was not told yet.
-    pub(super) fn fault(&mut self) -> Result<(), RecordError> {
-        self.fault.take().map_or(Ok(()), Err)
+    /// Sees that everything was taken down.
+    pub(super) fn check(&mut self) -> Result<(), RecordError> {
+        match (self.is_over, self.fault.take()) {
+            (false, _) => Ok(()),
+            (true, fault) => Err(fault.unwrap_or(RecordError::Over)),
+        }
+    }
+
+    /// Takes nothing down any more.
+    pub(super) fn end(&mut self) {
+        self.is_over = true;
     }
 
     /// What is to be written after so many frames; [`Journal::clear`] begins the next chunk.

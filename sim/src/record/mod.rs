@@ -74,3 +74,6 @@ const MAX_LETTERS: usize = 1 << 20;
 pub fn frames_to_checkpoint(frame: u64) -> u64 {
     CHECKPOINT_FRAMES - frame % CHECKPOINT_FRAMES
 }
+
+#[cfg(test)]
+mod tests;

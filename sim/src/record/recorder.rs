@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 use super::chunk::{ChunkWriter, Kind};
 use super::event::{Control, Stop, Totals};
 use super::flaw::RecordError;
-use super::frames_to_checkpoint;
 use super::header::Header;
 use super::journal::Journal;
 use super::wire::Encoder;
+use super::{CHECKPOINT_FRAMES, frames_to_checkpoint};
 use crate::executor::FrameRecord;
 use crate::manager::VeManager;
 use crate::object::ObjectId;
@@ -64,12 +64,12 @@ impl<W: Write> Recorder<W> {
         let written = Instant::now();
         let mut recorder = Self { writer, journal, written, hashes: Vec::new(), checked: None };
         recorder.checkpoint(manager)?;
-        recorder.write(frame)?;
+        recorder.write(manager)?;
         Ok(recorder)
     }
 
     /// Advances by `frames` frames, with a checkpoint before every frame whose number is a multiple of
-    /// [`CHECKPOINT_FRAMES`](super::CHECKPOINT_FRAMES), and writes what was recorded.
+    /// [`CHECKPOINT_FRAMES`], and writes what was recorded.
     ///
     /// # Errors
     /// The executor cannot go on, or what was recorded cannot be written. Frames may be left to do then:
@@ -86,15 +86,14 @@ impl<W: Write> Recorder<W> {
             let frame = manager.frame();
             let piece = frames_to_checkpoint(frame).min(end - frame);
             manager.run(piece, renderer, on_frame)?;
-            let frame = manager.frame();
-            if frames_to_checkpoint(frame) == super::CHECKPOINT_FRAMES {
+            if frames_to_checkpoint(manager.frame()) == CHECKPOINT_FRAMES {
                 self.checkpoint(manager)?;
             }
-            self.fault()?;
+            self.lock().check()?;
             if self.written.elapsed() > MOST_WAITING || self.lock().len() > MANY_BYTES {
-                self.write(frame)?;
+                self.write(manager)?;
             }
-            if frame >= end {
+            if manager.frame() >= end {
                 return Ok(());
             }
         }
@@ -145,7 +144,7 @@ impl<W: Write> Recorder<W> {
     /// It has failed before, or cannot be written.
     pub fn finish(mut self, manager: &VeManager) -> Result<(W, Totals), RecordError> {
         self.checkpoint(manager)?;
-        self.write(manager.frame())?;
+        self.write(manager)?;
         let totals = self.lock().totals();
         let mut bytes = Vec::new();
         totals.encode(&mut Encoder(&mut bytes));
@@ -156,18 +155,21 @@ impl<W: Write> Recorder<W> {
     fn stop(&mut self, frame: u64, stop: &Stop) -> Result<(), RecordError> {
         let mut journal = self.lock();
         journal.stop(frame, stop);
-        journal.fault()
+        journal.check()
     }
 
-    fn fault(&self) -> Result<(), RecordError> {
-        self.lock().fault()
-    }
-
-    /// Writes what was recorded in the frames before `frame`.
-    fn write(&mut self, frame: u64) -> Result<(), RecordError> {
+    /// Writes what was recorded so far, which [`Recorder::run`] does about once a second.
+    ///
+    /// # Errors
+    /// The recording has failed before, or cannot be written.
+    pub fn write(&mut self, manager: &VeManager) -> Result<(), RecordError> {
         let mut journal = self.journal.lock().unwrap_or_else(PoisonError::into_inner);
-        let payload = journal.close(frame)?;
-        self.writer.write(Kind::Events, payload)?;
+        journal.check()?;
+        let payload = journal.close(manager.frame())?;
+        if let Err(error) = self.writer.write(Kind::Events, payload) {
+            journal.end();
+            return Err(error.into());
+        }
         journal.clear();
         self.written = Instant::now();
         Ok(())
