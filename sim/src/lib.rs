@@ -22,6 +22,7 @@
 //! | §7–§8: Eqs. 2–4, Figs. 11–17, Table 1 | `experiment`, with the feature of that name |
 //! | (not in the paper) computed tomography in, volumes out | `image`, with the feature of that name |
 //! | (not in the paper) what each worker did when | [`timeline`] |
+//! | (not in the paper) sessions recorded and replayed, bit for bit | [`record`] |
 //! | (not in the paper) kernels in vector instructions | [`simd`] |
 
 #![deny(unsafe_code)]
@@ -43,6 +44,7 @@ pub mod message;
 mod mix;
 pub mod object;
 pub mod pool;
+pub mod record;
 pub mod render;
 pub mod scene;
 #[allow(unsafe_code)]

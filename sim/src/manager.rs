@@ -122,6 +122,12 @@ impl VeManager {
         &self.pool
     }
 
+    /// The number of the next frame: the scene's, and one more for each frame done since.
+    #[must_use]
+    pub fn frame(&self) -> u64 {
+        self.executor.frame()
+    }
+
     /// Where messages from outside are posted, by any thread at any time.
     #[must_use]
     pub fn mailbox(&self) -> Mailbox {

@@ -38,6 +38,13 @@ impl StateHash {
     }
 }
 
+/// Of objects whose hashes are known.
+impl FromIterator<(ObjectId, u64)> for StateHash {
+    fn from_iter<I: IntoIterator<Item = (ObjectId, u64)>>(hashes: I) -> Self {
+        Self { hashes: hashes.into_iter().collect() }
+    }
+}
+
 /// The hash over the state of one object.
 #[must_use]
 pub fn object_hash(object: &Object) -> u64 {

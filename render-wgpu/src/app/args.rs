@@ -8,6 +8,7 @@ use dualframe_sim::blocking::{Blocking, Grain};
 use dualframe_sim::executor::{Entry, ExecutorKind, MAX_THREADS};
 use dualframe_sim::experiment::Experiment;
 use dualframe_sim::experiment::plan::Plan;
+use dualframe_sim::manager::Settings;
 use dualframe_sim::pool::cores;
 use dualframe_sim::scene::ParticleScene;
 use dualframe_sim::simd::{Instructions, Simd};
@@ -35,6 +36,8 @@ struct Cli {
 enum Command {
     /// Deformable particles in a room of six walls (the default).
     Particles(Particles),
+    /// A recorded session once more, checked bit for bit.
+    Replay(ReplayArgs),
     /// The paper's experiments on this machine: tables (CSV), figures (SVG, PNG) and a page.
     Experiment(ExperimentArgs),
 }
@@ -83,6 +86,69 @@ impl ExperimentArgs {
     }
 }
 
+/// How frames are run, which changes no result.
+#[derive(Args)]
+pub(super) struct Way {
+    #[arg(long, value_name = "N", default_value_t = cores().min(MAX_THREADS),
+          value_parser = parse_threads,
+          help = format!("Number of threads, 1 to {MAX_THREADS}; all cores if not given"))]
+    pub(super) threads: usize,
+    #[arg(long, value_name = "NAME", default_value = ExecutorKind::Pipeline.name(),
+          value_parser = parse_executor,
+          help = format!("What drives the stages: {}", executor_names()))]
+    pub(super) executor: ExecutorKind,
+    /// Blocks of close objects, or every modelled pair.
+    #[arg(long, value_name = "KIND", value_enum, default_value_t = BroadPhaseName::Spatial)]
+    broad_phase: BroadPhaseName,
+    /// Frames that the pipeline works on at once, 1 or 2.
+    #[arg(long, value_name = "N", default_value_t = 2,
+          value_parser = clap::value_parser!(u8).range(1..=2))]
+    pub(super) frames_in_flight: u8,
+    #[arg(long, value_name = "NAME", value_parser = parse_simd,
+          help = format!("Vector instructions of the kernels, {}; the widest that the machine has \
+                          if not given", Instructions::ALL.map(Instructions::name).join(" or ")))]
+    simd: Option<Simd>,
+}
+
+impl Way {
+    fn grain(&self) -> Grain {
+        match self.broad_phase {
+            BroadPhaseName::Spatial => Grain::Spatial,
+            BroadPhaseName::Pairwise => Grain::Pairwise,
+        }
+    }
+
+    fn entry(&self) -> Entry {
+        if self.frames_in_flight == 1 { Entry::AfterSwap } else { Entry::AfterUpdate }
+    }
+
+    pub(super) fn simd(&self) -> Simd {
+        self.simd.unwrap_or_else(Simd::detect)
+    }
+
+    pub(super) fn settings(&self) -> Settings {
+        let Self { executor, threads, .. } = *self;
+        Settings { executor, threads, pinned: false, grain: self.grain(), entry: self.entry() }
+    }
+}
+
+/// Arguments of a replay.
+#[derive(Args)]
+#[command(
+    after_help = "Status 0: every checkpoint agreed. Status 1: one did not, or the file is damaged \
+                        and what is whole of it was played. Status 2: nothing of it can be played."
+)]
+pub(super) struct ReplayArgs {
+    /// The recording.
+    #[arg(value_name = "FILE")]
+    pub(super) file: PathBuf,
+    #[command(flatten)]
+    pub(super) way: Way,
+    /// Write what came of it as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub(super) json: Option<PathBuf>,
+}
+
 /// Arguments of the particle environment.
 #[derive(Args)]
 #[command(after_help = format!("With --broad-phase pairwise there can be {MAX_PAIRWISE} particles at most."))]
@@ -95,31 +161,14 @@ pub(super) struct Particles {
           help = format!("Number of frames, 1 to {MAX_FRAMES}; if not given, {USUAL_FRAMES}, or in a \
                           window until it is closed"))]
     pub(super) frames: Option<u64>,
-    #[arg(long, value_name = "N", default_value_t = cores().min(MAX_THREADS),
-          value_parser = parse_threads,
-          help = format!("Number of threads, 1 to {MAX_THREADS}; all cores if not given"))]
-    pub(super) threads: usize,
     /// What velocities and substeps are drawn from.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(super) seed: u64,
     /// Let the particles fall.
     #[arg(long)]
     pub(super) gravity: bool,
-    #[arg(long, value_name = "NAME", default_value = ExecutorKind::Pipeline.name(),
-          value_parser = parse_executor,
-          help = format!("What drives the stages: {}", executor_names()))]
-    pub(super) executor: ExecutorKind,
-    /// Blocks of close particles, or every modelled pair.
-    #[arg(long, value_name = "KIND", value_enum, default_value_t = BroadPhaseName::Spatial)]
-    broad_phase: BroadPhaseName,
-    /// Frames that the pipeline works on at once, 1 or 2.
-    #[arg(long, value_name = "N", default_value_t = 2,
-          value_parser = clap::value_parser!(u8).range(1..=2))]
-    pub(super) frames_in_flight: u8,
-    #[arg(long, value_name = "NAME", value_parser = parse_simd,
-          help = format!("Vector instructions of the kernels, {}; the widest that the machine has \
-                          if not given", Instructions::ALL.map(Instructions::name).join(" or ")))]
-    simd: Option<Simd>,
+    #[command(flatten)]
+    pub(super) way: Way,
     /// Show a window, which is what happens where there is a display
     #[arg(long, conflicts_with_all = ["headless", "offscreen"])]
     pub(super) window: bool,
@@ -144,6 +193,9 @@ pub(super) struct Particles {
     /// Write what each worker did in the last seconds, for chrome://tracing or ui.perfetto.dev
     #[arg(long, value_name = "FILE")]
     pub(super) trace: Option<PathBuf>,
+    /// Record the session, for `dualframe replay`; starting anew in a window ends the recording
+    #[arg(long, value_name = "FILE")]
+    pub(super) record: Option<PathBuf>,
     /// Write the report as JSON.
     #[arg(long, value_name = "FILE")]
     pub(super) json: Option<PathBuf>,
@@ -156,21 +208,6 @@ enum BroadPhaseName {
 }
 
 impl Particles {
-    pub(super) fn grain(&self) -> Grain {
-        match self.broad_phase {
-            BroadPhaseName::Spatial => Grain::Spatial,
-            BroadPhaseName::Pairwise => Grain::Pairwise,
-        }
-    }
-
-    pub(super) fn entry(&self) -> Entry {
-        if self.frames_in_flight == 1 { Entry::AfterSwap } else { Entry::AfterUpdate }
-    }
-
-    pub(super) fn simd(&self) -> Simd {
-        self.simd.unwrap_or_else(Simd::detect)
-    }
-
     /// The number of frames of a run without a window.
     pub(super) fn frames(&self) -> u64 {
         self.frames.unwrap_or(USUAL_FRAMES)
@@ -184,7 +221,7 @@ impl Particles {
 
     /// What fits no single argument.
     fn check(self) -> Result<Self, String> {
-        if self.grain() == Grain::Pairwise && self.objects > MAX_PAIRWISE {
+        if self.way.grain() == Grain::Pairwise && self.objects > MAX_PAIRWISE {
             let objects = self.objects;
             return Err(format!(
                 "--objects {objects}: --broad-phase pairwise allows {MAX_PAIRWISE} particles"
@@ -245,6 +282,7 @@ fn parse_simd(text: &str) -> Result<Simd, String> {
 /// What the arguments ask for.
 pub(super) enum Outcome {
     Run(Particles),
+    Replay(ReplayArgs),
     Experiment(ExperimentArgs),
     /// Help or version, already printed.
     Told,
@@ -259,6 +297,7 @@ pub(super) fn parse() -> Outcome {
     };
     let particles = match cli.command {
         Some(Command::Particles(particles)) => particles,
+        Some(Command::Replay(replay)) => return Outcome::Replay(replay),
         Some(Command::Experiment(experiment)) => return Outcome::Experiment(experiment),
         None => cli.particles,
     };

@@ -6,13 +6,16 @@ mod measure;
 mod outputs;
 mod particles;
 mod pictures;
+mod recording;
+mod replay;
 mod report;
+mod scenes;
 mod window;
 
 use std::error::Error;
 use std::process::ExitCode;
 
-use self::args::{ExperimentArgs, Outcome, Particles};
+use self::args::{ExperimentArgs, Outcome, Particles, ReplayArgs};
 use self::outputs::Outputs;
 use self::particles::RunError;
 
@@ -30,6 +33,7 @@ const BAD_ARGUMENT: u8 = 2;
 pub(crate) fn main(allocations: AllocationCounter<'_>) -> ExitCode {
     match args::parse() {
         Outcome::Run(particles) => run_particles(&particles, allocations),
+        Outcome::Replay(args) => run_replay(&args),
         Outcome::Experiment(args) => run_experiments(&args),
         Outcome::Told => ExitCode::SUCCESS,
         Outcome::Bad(line) => fail(&line, BAD_ARGUMENT),
@@ -43,6 +47,28 @@ fn run_experiments(args: &ExperimentArgs) -> ExitCode {
     match experiment::run(args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => fail(&with_causes(&error), UNSOUND),
+    }
+}
+
+fn run_replay(args: &ReplayArgs) -> ExitCode {
+    let json = match args.json.as_deref().map(outputs::open).transpose() {
+        Ok(json) => json,
+        Err(line) => return fail(&line, BAD_ARGUMENT),
+    };
+    let told = |error| format!("{}: {}", args.file.display(), with_causes(error));
+    let report = match replay::run(args) {
+        Ok(report) => report,
+        Err(error) => return fail(&told(&error), BAD_ARGUMENT),
+    };
+    report.print();
+    if let Some(json) = &json
+        && let Err(line) = report.write(json)
+    {
+        return fail(&line, UNSOUND);
+    }
+    match &report.fault {
+        Some(fault) => fail(&told(fault), UNSOUND),
+        None => ExitCode::SUCCESS,
     }
 }
 

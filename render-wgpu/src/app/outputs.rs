@@ -5,6 +5,8 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
+use serde::Serialize;
+
 use super::args::Particles;
 use super::pictures::file_of_frame;
 
@@ -13,6 +15,7 @@ pub(super) struct Outputs {
     pub(super) json: Option<File>,
     pub(super) picture: Option<File>,
     pub(super) trace: Option<File>,
+    pub(super) record: Option<File>,
 }
 
 impl Outputs {
@@ -27,6 +30,7 @@ impl Outputs {
             json: open(&args.json)?,
             picture: open(&args.picture)?,
             trace: open(&args.trace)?,
+            record: open(&args.record)?,
         })
     }
 }
@@ -43,16 +47,31 @@ pub(super) fn make_folder(path: &Path) -> Result<(), String> {
     made.map_err(|error| format!("cannot make the folder {}: {error}", path.display()))
 }
 
+/// Empties a file, which is then written from its beginning.
+pub(super) fn empty(file: &File) -> io::Result<()> {
+    // Pipes and devices have no length.
+    if file.metadata()?.is_file() {
+        file.set_len(0)?;
+    }
+    Ok(())
+}
+
 /// Writes a file anew.
 pub(super) fn replace<'a>(
     file: &'a File,
     write: impl FnOnce(&mut BufWriter<&'a File>) -> io::Result<()>,
 ) -> io::Result<()> {
-    // Pipes and devices have no length.
-    if file.metadata()?.is_file() {
-        file.set_len(0)?;
-    }
+    empty(file)?;
     let mut writer = BufWriter::new(file);
     write(&mut writer)?;
     writer.flush()
+}
+
+/// Writes a file anew, as one JSON object.
+pub(super) fn write_json(file: &File, value: &impl Serialize) -> Result<(), String> {
+    let written = replace(file, |writer| {
+        serde_json::to_writer(&mut *writer, value)?;
+        writer.write_all(b"\n")
+    });
+    written.map_err(|error| format!("cannot write the JSON: {error}"))
 }

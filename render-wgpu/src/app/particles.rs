@@ -8,7 +8,8 @@ use dualframe_render_wgpu::error::GraphicsError;
 use dualframe_sim::executor::{Entry, ExecutorError, ExecutorKind, FrameRecord};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::object::FaultKind;
-use dualframe_sim::render::NullRenderer;
+use dualframe_sim::record::RecordError;
+use dualframe_sim::render::{NullRenderer, Renderer};
 use dualframe_sim::scene::{ParticleScene, Scene, SceneError};
 use dualframe_sim::timeline::Timeline;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -19,6 +20,7 @@ use super::args::Particles;
 use super::measure::Measure;
 use super::outputs::{self, Outputs};
 use super::pictures::Pictures;
+use super::recording::Recording;
 use super::report::{FrameMilliseconds, Report};
 use super::window::{Session, most_threads};
 
@@ -42,6 +44,8 @@ pub(super) enum RunError {
     Picture(#[source] io::Error),
     #[error("the trace cannot be written")]
     Trace(#[source] io::Error),
+    #[error(transparent)]
+    Record(#[from] RecordError),
 }
 
 /// The environment that `args` describe, with another number of particles.
@@ -49,19 +53,9 @@ pub(super) fn scene_of(args: &Particles, objects: usize) -> ParticleScene {
     ParticleScene { seed: args.seed, gravity: args.gravity, ..ParticleScene::new(objects) }
 }
 
-/// How `args` want it to be run, apart from what a window can change.
-pub(super) fn settings_of(
-    args: &Particles,
-    executor: ExecutorKind,
-    threads: usize,
-    entry: Entry,
-) -> Settings {
-    Settings { executor, threads, pinned: false, grain: args.grain(), entry }
-}
-
 fn build(args: &Particles) -> Result<Scene, SceneError> {
     let mut scene = scene_of(args, args.objects).build()?;
-    scene.stages.simd = args.simd();
+    scene.stages.simd = args.way.simd();
     Ok(scene)
 }
 
@@ -72,13 +66,15 @@ pub(super) fn run(
     count: AllocationCounter<'_>,
     note: &dyn Fn(&str),
 ) -> Result<Report, RunError> {
-    let settings = settings_of(args, args.executor, args.threads, args.entry());
+    let settings = args.way.settings();
     let spans = if args.trace.is_some() { TRACED_SPANS } else { SHOWN_SPANS };
     // One more for whoever renders beside rayon's workers.
-    let workers = args.threads.max(most_threads()) + 1;
+    let workers = args.way.threads.max(most_threads()) + 1;
     let timeline = Arc::new(Timeline::new(workers, spans));
     let window = open_window(args, &timeline, note)?;
     let mut manager = VeManager::new(build(args)?, settings)?;
+    let spec = scene_of(args, args.objects);
+    let recording = Recording::begin(outputs.record.as_ref(), &spec, &manager)?;
     if window.is_some() || outputs.trace.is_some() {
         manager.watch(Arc::clone(&timeline));
     }
@@ -88,10 +84,10 @@ pub(super) fn run(
             measure.start();
             let picture = outputs.picture.as_ref();
             let on_frame = &mut |record: &FrameRecord| measure.frame(record);
-            let manager = window.run(manager, args.frames, picture, on_frame)?;
+            let manager = window.run(manager, recording, args.frames, picture, on_frame)?;
             report(args, &manager, &measure, None)
         }
-        None => run_unwatched(args, outputs, manager, settings, count)?,
+        None => run_unwatched(args, outputs, (manager, recording), settings, count)?,
     };
     if let Some(file) = &outputs.trace {
         let write = |writer: &mut BufWriter<&File>| timeline.write_chrome_trace(writer);
@@ -104,12 +100,12 @@ pub(super) fn run(
 fn open_window<'a>(
     args: &'a Particles,
     timeline: &Arc<Timeline>,
-    note: &dyn Fn(&str),
+    note: &'a dyn Fn(&str),
 ) -> Result<Option<Session<'a>>, RunError> {
     if !args.prefers_window() {
         return Ok(None);
     }
-    match Session::open(args, Arc::clone(timeline)) {
+    match Session::open(args, Arc::clone(timeline), note) {
         Ok(window) => Ok(Some(window)),
         Err(error) if args.window => Err(error.into()),
         Err(error) => {
@@ -125,7 +121,7 @@ fn open_window<'a>(
 fn run_unwatched(
     args: &Particles,
     outputs: &Outputs,
-    mut manager: VeManager,
+    (mut manager, mut recording): (VeManager, Recording<'_>),
     settings: Settings,
     count: AllocationCounter<'_>,
 ) -> Result<Report, RunError> {
@@ -140,10 +136,13 @@ fn run_unwatched(
             measure.beside(|| bar.inc(1));
         }
     };
-    match &mut pictures {
-        Some(pictures) => manager.run(frames, pictures, &mut on_frame)?,
-        None => manager.run(frames, &mut NullRenderer::new(), &mut on_frame)?,
-    }
+    let mut unwatched = NullRenderer::new();
+    let renderer: &mut dyn Renderer = match &mut pictures {
+        Some(pictures) => pictures,
+        None => &mut unwatched,
+    };
+    recording.run(&mut manager, frames, renderer, &mut on_frame)?;
+    recording.end(&manager)?;
     bar.finish_and_clear();
     let is_drawn = pictures.is_some();
     if let Some(pictures) = pictures {
@@ -206,7 +205,7 @@ fn report(
         scene: "particles",
         executor: executor.name(),
         threads,
-        simd: args.simd().instructions().name(),
+        simd: args.way.simd().instructions().name(),
         objects,
         nodes,
         springs,

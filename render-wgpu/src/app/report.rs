@@ -105,11 +105,7 @@ impl Report {
 
     /// Writes the report as one JSON object.
     pub(super) fn write(&self, file: &File) -> Result<(), String> {
-        let written = outputs::replace(file, |writer| {
-            serde_json::to_writer(&mut *writer, self)?;
-            writer.write_all(b"\n")
-        });
-        written.map_err(|error| format!("cannot write the JSON: {error}"))
+        outputs::write_json(file, self)
     }
 
     /// Prints the closing table.

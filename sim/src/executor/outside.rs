@@ -92,7 +92,7 @@ impl Outside {
         if slot.frame.load(Ordering::Relaxed) != due {
             letters.clear();
         }
-        self.mailbox.take(|to, message| letters.push(ObjectId::HOST, to, message));
+        self.mailbox.take(due, |to, message| letters.push(ObjectId::HOST, to, message));
         letters.sort();
         let frame = if letters.is_empty() { Due::NONE } else { due };
         slot.frame.store(frame, Ordering::Relaxed);

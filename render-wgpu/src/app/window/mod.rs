@@ -20,10 +20,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use dualframe_render_wgpu::error::GraphicsError;
-use dualframe_sim::executor::{ExecutorError, ExecutorKind, FrameRecord};
-use dualframe_sim::manager::VeManager;
+use dualframe_sim::executor::{ExecutorKind, FrameRecord};
+use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::message::Message;
 use dualframe_sim::object::ObjectId;
+use dualframe_sim::record::Control;
 use dualframe_sim::scene::{ParticleScene, Scene};
 use dualframe_sim::stages;
 use dualframe_sim::timeline::Timeline;
@@ -35,6 +36,7 @@ use self::view::{Shown, View};
 use crate::app::args::Particles;
 use crate::app::particles::{self, RunError};
 use crate::app::pictures;
+use crate::app::recording::Recording;
 
 /// How long a run of frames takes, about; usually 50 ms: so late may controls take effect.
 const RUN_SECONDS: f32 = 0.05;
@@ -53,6 +55,8 @@ pub(super) struct Session<'a> {
     applied: Controls,
     /// Its particles.
     objects: usize,
+    /// Is told what the person at the terminal should know.
+    note: &'a dyn Fn(&str),
 }
 
 impl<'a> Session<'a> {
@@ -63,6 +67,7 @@ impl<'a> Session<'a> {
     pub(super) fn open(
         args: &'a Particles,
         timeline: Arc<Timeline>,
+        note: &'a dyn Fn(&str),
     ) -> Result<Self, GraphicsError> {
         let scene = particles::scene_of(args, args.objects);
         let shown = Shown {
@@ -74,7 +79,7 @@ impl<'a> Session<'a> {
         };
         let controls = Controls::new(args);
         let view = View::open(shown, args.adapter.as_deref(), controls)?;
-        Ok(Self { args, view, applied: controls, objects: args.objects })
+        Ok(Self { args, view, applied: controls, objects: args.objects, note })
     }
 
     /// Runs the environment until the window is closed, or so many frames are done; gives back the
@@ -85,6 +90,7 @@ impl<'a> Session<'a> {
     pub(super) fn run(
         mut self,
         mut manager: VeManager,
+        mut recording: Recording<'_>,
         frames: Option<u64>,
         picture: Option<&File>,
         on_frame: &mut dyn FnMut(&FrameRecord),
@@ -92,7 +98,7 @@ impl<'a> Session<'a> {
         self.view.turn_to(self.view.painter.look.focus, manager.mailbox());
         let mut left = frames.unwrap_or(u64::MAX);
         while left > 0 && !self.view.is_closing() {
-            manager = self.apply(manager)?;
+            manager = self.apply(manager, &mut recording)?;
             let controls = &mut self.view.controls;
             let wanted = match (controls.is_paused, std::mem::take(&mut controls.steps)) {
                 (false, _) => self.frames_of_a_run(),
@@ -103,9 +109,10 @@ impl<'a> Session<'a> {
                 continue;
             }
             let count = wanted.min(left);
-            self.advance(&mut manager, count, on_frame)?;
+            self.advance((&mut manager, &mut recording), count, on_frame)?;
             left -= count;
         }
+        recording.end(&manager)?;
         if let Some(failure) = self.view.failure() {
             return Err(failure.into());
         }
@@ -123,12 +130,12 @@ impl<'a> Session<'a> {
 
     fn advance(
         &mut self,
-        manager: &mut VeManager,
+        (manager, recording): (&mut VeManager, &mut Recording<'_>),
         frames: u64,
         on_frame: &mut dyn FnMut(&FrameRecord),
-    ) -> Result<(), ExecutorError> {
+    ) -> Result<(), RunError> {
         let stats = Rc::clone(&self.view.stats);
-        manager.run(frames, &mut self.view, &mut |record| {
+        recording.run(manager, frames, &mut self.view, &mut |record| {
             stats.borrow_mut().note(record);
             on_frame(record);
         })
@@ -149,10 +156,18 @@ impl<'a> Session<'a> {
     }
 
     /// Does what is new in the controls.
-    fn apply(&mut self, mut manager: VeManager) -> Result<VeManager, RunError> {
+    fn apply(
+        &mut self,
+        mut manager: VeManager,
+        recording: &mut Recording<'_>,
+    ) -> Result<VeManager, RunError> {
         let (now, before) = (self.view.controls, self.applied);
         self.applied = now;
         if now.restarts != before.restarts {
+            if recording.end(&manager)? {
+                let frame = manager.frame();
+                (self.note)(&format!("the recording ends before frame {frame}: started anew"));
+            }
             return self.restart();
         }
         let is_pipeline = now.executor == ExecutorKind::Pipeline;
@@ -164,7 +179,8 @@ impl<'a> Session<'a> {
         }
         manager.pool().resize(now.threads);
         if now.gravity != before.gravity {
-            manager.change(&mut |stages| stages.gravity = Vec3::NEG_Y * now.gravity);
+            let gravity = Control::Gravity(Vec3::NEG_Y * now.gravity);
+            recording.control(&mut manager, gravity)?;
         }
         if now.stiffness != before.stiffness {
             let (between_nodes, to_center) = (now.stiffness, now.stiffness * CENTER_STIFFNESS);
@@ -182,7 +198,7 @@ impl<'a> Session<'a> {
         self.objects = now.objects;
         let particles = particles::scene_of(self.args, now.objects);
         let mut scene = particles.build()?;
-        scene.stages.simd = self.args.simd();
+        scene.stages.simd = self.args.way.simd();
         scene.stages.gravity = Vec3::NEG_Y * now.gravity;
         let manager = self.manage(scene)?;
         let (between_nodes, to_center) = (now.stiffness, now.stiffness * CENTER_STIFFNESS);
@@ -195,7 +211,7 @@ impl<'a> Session<'a> {
     fn manage(&self, scene: Scene) -> Result<VeManager, RunError> {
         let Controls { executor, threads, .. } = self.view.controls;
         let entry = self.view.controls.entry();
-        let settings = particles::settings_of(self.args, executor, threads, entry);
+        let settings = Settings { executor, threads, entry, ..self.args.way.settings() };
         let mut manager = VeManager::new(scene, settings)?;
         manager.watch(Arc::clone(&self.view.timeline));
         Ok(manager)

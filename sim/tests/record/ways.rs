@@ -1,0 +1,142 @@
+//! Whatever ran when a session was recorded, and whatever runs when it is replayed.
+
+use dualframe_sim::blocking::Grain;
+use dualframe_sim::executor::{Entry, ExecutorKind};
+use dualframe_sim::manager::{Settings, VeManager};
+use dualframe_sim::message::{Custom, Message};
+use dualframe_sim::object::{Object, ObjectId};
+use dualframe_sim::record::{Flaw, Header, RecordError, Recorder, ReplayError};
+use dualframe_sim::render::NullRenderer;
+use dualframe_sim::scene::ParticleScene;
+
+use crate::session::{PARTICLES, read, replay, session, spec};
+
+const FRAMES: u64 = 200;
+
+/// Every executor with 1, 2 and 4 threads, one frame in flight and two.
+fn all_ways() -> Vec<Settings> {
+    let mut ways = Vec::new();
+    for &executor in ExecutorKind::ALL {
+        for threads in [1, 2, 4] {
+            for entry in [Entry::AfterUpdate, Entry::AfterSwap] {
+                let grain = if ways.len() % 3 == 2 { Grain::Pairwise } else { Grain::Spatial };
+                ways.push(Settings { executor, threads, entry, grain, ..Settings::default() });
+            }
+        }
+    }
+    ways
+}
+
+fn serial() -> Settings {
+    Settings { executor: ExecutorKind::Serial, threads: 1, ..Settings::default() }
+}
+
+#[test]
+fn a_session_replays_in_every_way() {
+    let ways = all_ways();
+    for seed in 1..=5 {
+        // Recorded in other ways each time, one after the other.
+        let mut recorded = ways.clone();
+        recorded.rotate_left(5 * seed as usize);
+        let session = session(seed, FRAMES, &recorded);
+        let totals = session.totals;
+        assert!(totals.letters > 50 && totals.controls > 0, "{totals:?}");
+        // Before frames 0, 60, 120 and 180, and at the end.
+        assert_eq!((totals.frames, totals.additions, totals.checkpoints), (FRAMES, 1, 5));
+        for &way in &ways {
+            for most in [1, 13, u64::MAX] {
+                let played = replay(&session.file, way, most).expect("a header");
+                assert!(played.error.is_none(), "{seed}, {way:?}: {}", played.error.unwrap());
+                assert_eq!((played.frames, played.checkpoints), (FRAMES, 5), "{seed}, {way:?}");
+                assert_eq!(played.hash, session.last(), "{seed}, {way:?}, by {most}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_session_is_recorded_the_same_in_every_way() {
+    let expected = session(9, FRAMES, &[serial()]);
+    for way in all_ways() {
+        let session = session(9, FRAMES, &[way]);
+        assert_eq!(session.hashes, expected.hashes, "{way:?}");
+        // Chunks end where time says.
+        let events = read(&session.file).0;
+        assert!(events == read(&expected.file).0, "{way:?}");
+    }
+}
+
+#[test]
+fn recording_changes_nothing() {
+    let run = |is_recorded: bool| {
+        let scene = spec(5).build().expect("a valid scene");
+        let mut manager = VeManager::new(scene, serial()).expect("valid settings");
+        let mut renderer = NullRenderer::new();
+        if is_recorded {
+            let mut recorder =
+                Recorder::begin(Vec::new(), &Header::of(&spec(5)), &manager).expect("a start");
+            recorder.run(&mut manager, 100, &mut renderer, &mut |_| {}).expect("it runs");
+        } else {
+            manager.run(100, &mut renderer, &mut |_| {}).expect("it runs");
+        }
+        (manager.state_hash(), renderer.checksum())
+    };
+    assert_eq!(run(true), run(false));
+}
+
+#[test]
+fn a_session_that_did_not_begin() {
+    let spec = ParticleScene::new(1);
+    let scene = spec.build().expect("a valid scene");
+    let mut manager = VeManager::new(scene, serial()).expect("valid settings");
+    let recorder = Recorder::begin(Vec::new(), &Header::of(&spec), &manager).expect("a start");
+    // Without a frame.
+    let (file, totals) = recorder.finish(&manager).expect("it is written");
+    assert_eq!((totals.frames, totals.checkpoints), (0, 1));
+    let played = replay(&file, serial(), 10).expect("a header");
+    assert_eq!((played.frames, played.error.is_none()), (0, true));
+    manager.run(1, &mut NullRenderer::new(), &mut |_| {}).expect("it runs");
+    let begun = Recorder::begin(Vec::new(), &Header::of(&spec), &manager);
+    assert!(matches!(begun, Err(RecordError::Begun { frame: 1 })));
+}
+
+#[derive(Debug)]
+struct OfMyOwn;
+
+impl Custom for OfMyOwn {
+    fn process(&self, _: &mut Object) {}
+}
+
+#[test]
+fn a_message_of_the_applications_own_is_named() {
+    let spec = spec(1);
+    let scene = spec.build().expect("a valid scene");
+    let mut manager = VeManager::new(scene, serial()).expect("valid settings");
+    let mut file = Vec::new();
+    let mut recorder = Recorder::begin(&mut file, &Header::of(&spec), &manager).expect("a start");
+    let mailbox = manager.mailbox();
+    let mut renderer = NullRenderer::new();
+    let mut run = |frames, on_frame: &mut dyn FnMut(&_)| {
+        let run = recorder.run(&mut manager, frames, &mut renderer, on_frame);
+        let written = recorder.write(&manager);
+        (run, written)
+    };
+    assert!(run(70, &mut |_| {}).0.is_ok());
+    let (failed, written) = run(30, &mut |record: &dualframe_sim::executor::FrameRecord| {
+        if record.frame == 80 {
+            mailbox.post(ObjectId(PARTICLES as u32 - 1), Message::Custom(Box::new(OfMyOwn)));
+        }
+    });
+    let error = failed.expect_err("it cannot be recorded").to_string();
+    let expected =
+        "a message from outside to object 11, due in frame 82, cannot be recorded: OfMyOwn";
+    assert_eq!(error, expected);
+    assert!(matches!(written, Err(RecordError::Over)));
+    assert_eq!(manager.frame(), 100, "the session goes on");
+    drop(recorder);
+    // What was written before plays.
+    let played = replay(&file, serial(), 1_000).expect("a header");
+    assert_eq!(played.frames, 70);
+    let Some(ReplayError::Recording(error)) = played.error else { panic!("{:?}", played.error) };
+    assert!(matches!(error.flaw, Flaw::CutOff));
+}
