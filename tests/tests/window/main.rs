@@ -6,7 +6,7 @@ mod desktop;
 use std::collections::BTreeMap;
 use std::thread::sleep;
 
-use dualframe_tests::program::{NO_ADAPTERS, read_json, report, told};
+use dualframe_tests::program::{NO_ADAPTERS, read_json, report, run, told};
 use serde_json::Value;
 
 use self::desktop::{Desktop, STILL, Screenshot};
@@ -101,6 +101,44 @@ fn the_slider_of_gravity_lets_a_particle_fall() {
     session.wait_until_lasting("the particle to lie on the floor", |now| middle(now).1 > FAR_DOWN);
     let report = session.close();
     assert_ne!(report["state_hash"], untouched(&ONE, &report["frames"]));
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn what_a_person_does_replays() {
+    let desktop = Desktop::start();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (file, json) = (folder.path().join("session"), folder.path().join("replay.json"));
+    let file = file.to_str().expect("a plain path");
+    let mut session = desktop.open(&[&ONE[..], &["--record", file]].concat());
+    session.strike(' ');
+    let paused = session.wait_until_still();
+    let (x, y) = paused.first_slider();
+    session.move_to(x as i16, y as i16);
+    session.press(true);
+    session.wait_until_still();
+    session.press(false);
+    session.wait_until_still();
+    session.strike('h');
+    session.wait_until_still();
+    session.move_to(MIDDLE.0, MIDDLE.1);
+    session.press(true);
+    session.move_to(MIDDLE.0 + 150, MIDDLE.1 + 110);
+    session.strike(' ');
+    session.wait_until_lasting("the particle to fall or follow", |now| middle(now).1 > FAR_DOWN);
+    session.press(false);
+    sleep(STILL);
+    let report = session.close();
+    assert_ne!(report["state_hash"], untouched(&ONE, &report["frames"]));
+    let way = ["--executor", "serial", "--json", json.to_str().expect("a plain path")];
+    let output = run(&[&["replay", file], &way[..]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let replayed = read_json(&json);
+    for key in ["frames", "state_hash"] {
+        assert_eq!(replayed[key], report[key], "{key}");
+    }
+    // Pulled, and let go.
+    assert!(replayed["messages"].as_u64() > Some(1), "{replayed}");
 }
 
 #[test]
