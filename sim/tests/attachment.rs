@@ -28,9 +28,13 @@ fn dot(id: u32, place: Vec3) -> Object {
 
 /// Two dots, 0.2 m apart, joined by a link of 0.1 m.
 fn joined(link: Link, response: Compliant) -> VeManager {
+    joined_by(Attached::new(vec![link]), response)
+}
+
+fn joined_by(attached: Attached, response: Compliant) -> VeManager {
     let objects = vec![dot(0, Vec3::ZERO), dot(1, Vec3::X * 0.2)];
     let mut rules = Rules::new();
-    let detection = Box::new(Attached::new(vec![link]));
+    let detection = Box::new(attached);
     let pair = InteractionPair { detection, response: Box::new(response) };
     rules.model(Group(0), Group(1), pair).expect("the groups exist");
     let (gravity, simd) = (Vec3::ZERO, Simd::detect());
@@ -98,6 +102,16 @@ fn a_contact_never_pulls() {
     run(&mut manager, 1);
     let [first, second] = state(&manager);
     assert!(first[1] < 0.0 && second[1] > 0.0);
+}
+
+#[test]
+fn a_loose_link_holds_only_near_its_length() {
+    let response = Compliant::link(5.0, 0.0).expect("it is positive");
+    for (stretch, holds) in [(0.05, false), (0.15, true)] {
+        let mut manager = joined_by(Attached::new(vec![LINK]).within(stretch), response);
+        run(&mut manager, 1);
+        assert_eq!(state(&manager)[0][1] > 0.0, holds, "{stretch}");
+    }
 }
 
 #[test]

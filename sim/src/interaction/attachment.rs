@@ -22,13 +22,22 @@ pub struct Link {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Attached {
     links: Vec<Link>,
+    /// How much longer than at rest a link may be and still hold, in metres.
+    stretch: f32,
 }
 
 impl Attached {
-    /// Two bodies that these links join.
+    /// Two bodies that these links join, however far they are apart.
     #[must_use]
     pub fn new(links: Vec<Link>) -> Self {
-        Self { links }
+        Self { links, stretch: f32::INFINITY }
+    }
+
+    /// The same for loose tissue: a link that is more than `stretch` metres longer than at rest does not
+    /// hold, until its ends are nearer again. Usually 0.005.
+    #[must_use]
+    pub fn within(self, stretch: f32) -> Self {
+        Self { stretch, ..self }
     }
 }
 
@@ -44,7 +53,7 @@ impl Detection for Attached {
             let Some((from, to)) = ends else { continue };
             let way = from - to;
             let length = way.length();
-            if length > 0.0 && length != rest {
+            if length > 0.0 && length != rest && length - rest <= self.stretch {
                 touches.push(Touch {
                     nodes,
                     normal: (way / length).to_array(),

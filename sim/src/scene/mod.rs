@@ -1,7 +1,10 @@
 //! Environments ready to run.
 
 mod bone;
+#[cfg(feature = "image")]
 pub mod craniotomy;
+#[cfg(feature = "image")]
+pub mod head;
 mod particles;
 mod random;
 
