@@ -6,7 +6,7 @@ use super::contact::Contact;
 use super::impulses::Impulses;
 use super::touches::{Touch, Touches};
 use super::{Detection, Response};
-use crate::behavior::drill::{Burr, FRICTION, Overlap, Reaction, elastic_force, half_space_depth};
+use crate::behavior::drill::{FRICTION, Overlap, Reaction};
 use crate::object::Object;
 
 /// Finds how deep a tool's bit is in bone. The pair's first object is the tool, the second a volume; a
@@ -24,18 +24,15 @@ impl Detection for BurrInBone {
     fn detect(&self, first: &Object, second: &Object, touches: &mut Touches) {
         let burr = first.behavior.burr(&first.geometry);
         let (Some(burr), Some(volume)) = (burr, second.geometry.as_volume()) else { return };
-        let Burr { bit, axis, side, .. } = burr;
         for center in burr.balls() {
-            let overlap = Overlap::new(volume, center, bit.radius, axis, bit.tip_radius);
-            let Some(normal) = overlap.normal(side) else { continue };
+            let overlap = Overlap::new(volume, &burr, center);
+            let Some(normal) = overlap.normal else { continue };
             let nodes = [Contact::BODY; 2];
-            let depth = overlap.depth(bit.radius);
-            touches.push(Touch { nodes, normal: normal.to_array(), depth });
-            let tip = -overlap.tip_moment.dot(axis);
-            if tip > 0.0 {
+            touches.push(Touch { nodes, normal: normal.to_array(), depth: overlap.depth });
+            if overlap.tip_depth > 0.0 {
                 let nodes = [Reaction::TIP, Contact::BODY];
-                let depth = half_space_depth(f64::from(tip), bit.radius);
-                touches.push(Touch { nodes, normal: axis.to_array(), depth });
+                let normal = burr.axis.to_array();
+                touches.push(Touch { nodes, normal, depth: overlap.tip_depth });
             }
         }
     }
@@ -61,7 +58,7 @@ impl Response for BurrForce {
         let Some(burr) = bodies[0].behavior.burr(&bodies[0].geometry) else { return };
         for touch in touches.list() {
             let normal = Vec3::from_array(touch.normal);
-            let force = elastic_force(burr.bit.radius, touch.depth);
+            let force = burr.bit.elastic_force(touch.depth);
             let elastic = normal * (force * time_step);
             if touch.nodes[0] == Reaction::TIP {
                 tool.add(Reaction::TIP, elastic.to_array());

@@ -33,8 +33,8 @@ impl Feed {
 
     /// A hand of at most `strength` newtons (usually 10 on a burr, 30 on a perforator) and a `resistance`
     /// in newton seconds per metre (usually [`Feed::RESISTANCE`]), that moves by at most `free_step`
-    /// metres a frame (usually the bit's radius, so that it meets the bone before it is half inside)
-    /// and in contact by `contact_step` (usually half a voxel).
+    /// metres a frame (usually half the bit's radius, so that it meets the bone long before it is half
+    /// inside) and in contact by `contact_step` (usually half a voxel).
     ///
     /// # Errors
     /// A value that is not finite and positive.
@@ -58,7 +58,8 @@ impl Feed {
     }
 
     /// The usual resistance, in newton seconds per metre: 1,000. It holds a ball of 3 mm that is pressed
-    /// by 20 N (33 kN/m at 0.9 mm) at 60 frames a second, and lets 10 N move a tool by 10 mm/s.
+    /// by 20 N (33 kN/m at 0.9 mm) at 60 frames a second, and lets 10 N move a tool by 10 mm/s. A perforator
+    /// pressed by 30 N is held by 3,000.
     pub const RESISTANCE: f32 = 1_000.0;
 
     /// Where a tool at `place` goes in a frame of `time_step` seconds if the hand wants it at `intended`
@@ -67,7 +68,7 @@ impl Feed {
     /// Where no bone is touched it goes there, by a free step at most. In contact the way along the normal
     /// and across it count by themselves: into the bone, and across, the hand pushes with its strength, or
     /// less if it has less than [`Feed::REACH`] to go, and what the contact's force leaves of that moves the
-    /// tool by a step in contact at most. Away from the bone it is free.
+    /// tool by a step in contact at most. Away from the bone it goes, or is pushed, by a free step at most.
     #[must_use]
     pub fn next(&self, place: Vec3, intended: Vec3, reaction: &Reaction, time_step: f32) -> Vec3 {
         let way = intended - place;
@@ -83,6 +84,16 @@ impl Feed {
         let stiffness = self.strength / Self::REACH;
         let push = |way: Vec3| (way * stiffness).clamp_length_max(self.strength);
         let force = push(normal * out) + push(across) + reaction.force;
-        place + (force * (time_step / self.resistance)).clamp_length_max(self.contact_step)
+        let step = force * (time_step / self.resistance);
+        let back = step.dot(normal).max(0.0);
+        let rest = (step - normal * back).clamp_length_max(self.contact_step);
+        place + normal * back.min(self.free_step) + rest
+    }
+
+    /// How hard the hand presses the bit on the bone, in newtons: the load that the bone bears, but no
+    /// more than the hand's strength, also in a frame in which the bit meets the bone deeper than that.
+    #[must_use]
+    pub fn load(&self, reaction: &Reaction) -> f32 {
+        reaction.load().min(self.strength)
     }
 }

@@ -177,3 +177,7 @@ impl Union {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "parts_tests.rs"]
+mod tests;

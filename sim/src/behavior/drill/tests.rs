@@ -1,0 +1,273 @@
+//! A hand, a bit and bone in a loop, as frames run it.
+
+use glam::Vec3;
+use parry3d::math::Pose;
+
+use super::*;
+use crate::geometry::Volume;
+use crate::scene::bone_piece;
+
+const TIME: f32 = 1.0 / 60.0;
+
+/// A drill in a hand over bone.
+struct Bench {
+    volume: Volume,
+    erosions: Erosions,
+    feed: Feed,
+    burr: Burr,
+    frame: u64,
+    waiting: Option<Erode>,
+    reaction: Reaction,
+}
+
+impl Bench {
+    fn new(volume: Volume, bit: Bit, tip: Vec3, spin: f32, strength: f32) -> Self {
+        let step = 0.5 * volume.spacing().min_element();
+        let resistance = if bit == Bit::PERFORATOR { 3e3 } else { Feed::RESISTANCE };
+        let feed = Feed::new(strength, resistance, 0.5 * bit.radius, step).expect("valid");
+        let center = tip + Vec3::Z * bit.radius;
+        Self {
+            volume,
+            erosions: Erosions::new(),
+            feed,
+            burr: Burr { bit, center, axis: Vec3::Z, spin, side: None },
+            frame: 0,
+            waiting: None,
+            reaction: Reaction::default(),
+        }
+    }
+
+    /// What `BurrInBone` and `BurrForce` tell a tool.
+    fn react(&self) -> Reaction {
+        let mut reaction = Reaction::default();
+        for center in self.burr.balls() {
+            let overlap = Overlap::new(&self.volume, &self.burr, center);
+            let Some(normal) = overlap.normal else { continue };
+            let force = self.burr.bit.elastic_force(overlap.depth);
+            reaction.elastic += normal * force;
+            reaction.force += normal * force
+                + self.burr.axis.cross(normal) * (FRICTION * force * self.burr.spin.signum());
+            reaction.tip += self.burr.bit.elastic_force(overlap.tip_depth);
+        }
+        reaction
+    }
+
+    /// A frame: contacts, the bone's update, the tool's update.
+    fn step(&mut self, intended: Vec3) -> u64 {
+        self.reaction = self.react();
+        if let Some(erode) = self.waiting.take() {
+            self.erosions.add(erode);
+        }
+        let removed = self.erosions.apply(&mut self.volume, self.frame, TIME);
+        self.burr.side = self.reaction.normal();
+        self.waiting = Some(Erode { burr: self.burr, load: self.feed.load(&self.reaction) });
+        self.burr.center = self.feed.next(self.burr.center, intended, &self.reaction, TIME);
+        self.frame += 1;
+        removed
+    }
+
+    fn tip(&self) -> Vec3 {
+        self.burr.center - Vec3::Z * self.burr.bit.radius
+    }
+}
+
+/// The highest point of a bone piece, and how thick it is.
+const TOP: Vec3 = Vec3::new(0.032, 0.032, 0.044);
+const THICKNESS: f32 = 7e-3;
+/// The radius of its outer surface.
+const CURVATURE: f32 = 0.085;
+
+/// Bar: a perforator under a constant push stops within 1 mm of the inner table's far side.
+#[test]
+fn a_perforator_stops_where_the_bone_ends() {
+    let bone = bone_piece(128, Pose::IDENTITY).expect("128 voxels");
+    for (x, y) in [(0.0_f32, 0.0_f32), (3.1e-3, 1.7e-3), (-4.3e-3, 2.2e-3), (1.3e-3, -6e-3)] {
+        let down = CURVATURE - (CURVATURE * CURVATURE - x * x - y * y).sqrt();
+        let top = TOP + Vec3::new(x, y, -down);
+        let axis = (top - TOP + Vec3::Z * CURVATURE).normalize();
+        let mut bench = Bench::new(bone.clone(), Bit::PERFORATOR, top, 0.0, Perforator::PUSH);
+        bench.burr.axis = axis;
+        bench.burr.center = top + axis * (Bit::PERFORATOR.radius + 2e-3);
+        let depth = |bench: &Bench| (top - bench.burr.center).dot(axis) + Bit::PERFORATOR.radius;
+        let (mut clutch, mut deepest) = (Perforator::new(), f32::MIN);
+        let (mut started, mut stopped) = (false, None);
+        for frame in 0..1_500 {
+            bench.step(top - axis * 0.05);
+            bench.burr.spin = clutch.turn(bench.reaction.tip);
+            if clutch.is_engaged() {
+                assert_eq!(stopped, None, "it engages again in frame {frame}");
+                started = true;
+            } else if started {
+                stopped.get_or_insert(frame);
+            }
+            if started {
+                deepest = deepest.max(depth(&bench));
+            }
+        }
+        println!("stopped in frame {stopped:?} at {} mm", deepest * 1e3);
+        let past = deepest - THICKNESS;
+        assert!((0.0..1e-3).contains(&past), "{past} m past the inner table at {x}, {y}");
+        assert!(stopped.is_some());
+    }
+}
+
+/// Full bone of 20 mm up to z = 15 mm, of so many 255ths.
+fn block(density: u8) -> Volume {
+    let full = |voxel: [u32; 3]| if voxel[2] < 30 { density } else { 0 };
+    Volume::from_fn([40; 3], Vec3::splat(5e-4), Pose::IDENTITY, full).expect("it is small")
+}
+
+const SURFACE: Vec3 = Vec3::new(0.01, 0.01, 0.015);
+
+#[test]
+fn a_constant_push_settles_without_oscillation() {
+    for push in [5.0, 10.0, 20.0] {
+        let tip = SURFACE + Vec3::Z * 1e-3;
+        let mut bench = Bench::new(block(255), Bit::BURR, tip, 0.0, push);
+        let mut depth = bench.tip().z;
+        let mut steps = Vec::new();
+        for _ in 0..120 {
+            bench.step(SURFACE - Vec3::Z * 0.01);
+            steps.push(depth - bench.tip().z);
+            depth = bench.tip().z;
+        }
+        let back = steps.iter().copied().fold(0.0, f32::min);
+        // It meets the bone by a free step, and comes back from that at most once.
+        let meets = steps.iter().position(|&step| step < 0.0).unwrap_or(0);
+        let later = &steps[meets + 1..];
+        let turns = later.windows(2).filter(|pair| pair[0] * pair[1] < -1e-14).count();
+        assert!(turns <= 1, "{turns} turns, {back} m back: {later:?}");
+        assert!(steps[119].abs() < 1e-7, "{} m in the last frame", steps[119]);
+        assert!((bench.reaction.elastic.z - push).abs() < 0.02 * push, "{:?}", bench.reaction);
+        assert!((bench.tip() - SURFACE).truncate().length() < 1e-4, "{}", bench.tip());
+    }
+}
+
+#[test]
+fn in_contact_no_frame_moves_by_more_than_half_a_voxel() {
+    let mut bench = Bench::new(block(255), Bit::BURR, SURFACE - Vec3::Z * 2e-4, 3_000.0, 20.0);
+    for frame in 0..300 {
+        let before = bench.burr.center;
+        let aside = Vec3::X * 5e-3 * if frame / 60 % 2 == 0 { 1.0 } else { -1.0 };
+        bench.step(SURFACE + aside - Vec3::Z * 5e-3);
+        let moved = bench.burr.center - before;
+        if let Some(normal) = bench.reaction.normal() {
+            let moved = (moved - normal * moved.dot(normal).max(0.0)).length();
+            assert!(moved <= 2.51e-4, "{moved} m in {frame}");
+        }
+    }
+    // And out of it there is no limit but that of free steps.
+    let before = bench.burr.center;
+    bench.step(SURFACE + Vec3::Z * 0.05);
+    assert!(bench.burr.center.z - before.z > 1e-3);
+}
+
+/// The work µ·F·v of a second over the specific energy, for the mean speed v.
+#[test]
+fn a_burr_goes_deeper_at_the_rate_of_removal() {
+    let depth_after = |density, frames| {
+        let mut bench = Bench::new(block(density), Bit::BURR, SURFACE, 3_000.0, 10.0);
+        for _ in 0..40 {
+            bench.step(SURFACE - Vec3::Z * 0.05);
+        }
+        let (start, removed) = (bench.tip().z, bench.erosions.removed());
+        for _ in 0..frames {
+            bench.step(SURFACE - Vec3::Z * 0.05);
+        }
+        let voxels = (bench.erosions.removed() - removed) as f32 / 255.0;
+        (start - bench.tip().z, voxels * bench.volume.voxel_volume())
+    };
+    let (depth, volume) = depth_after(255, 120);
+    // Between the speeds at the tip and at the rim, and near what the bit's description says.
+    let rate = volume / 2.0;
+    println!("{} mm/s, {} mm³/s", depth * 0.5e3, rate * 1e9);
+    assert!((30e-9..80e-9).contains(&rate), "{rate} m³/s");
+    // A hole of the burr's own width, once it is half in.
+    let hole = std::f32::consts::PI * Bit::BURR.radius.powi(2) * depth;
+    assert!((0.8..1.25).contains(&(volume / hole)), "{volume} m³ for {depth} m");
+    let (soft, _) = depth_after(100, 30);
+    let (hard, _) = depth_after(255, 30);
+    assert!(soft > 1.5 * hard, "{soft} m in soft bone, {hard} m in hard");
+}
+
+#[test]
+fn what_is_removed_follows_load_and_time_and_not_the_number_of_calls() {
+    let removed = |calls: u32, load: f32, spin: f32| {
+        let (mut volume, mut erosions) = (block(255), Erosions::new());
+        let center = SURFACE + Vec3::Z * 2e-3;
+        let axis = Vec3::new(0.6, 0.0, 0.8);
+        let burr = Burr { bit: Bit::BURR, center, axis, spin, side: None };
+        for call in 0..calls {
+            erosions.add(Erode { burr, load });
+            erosions.apply(&mut volume, u64::from(call), 0.02 / calls as f32);
+        }
+        let missing: u64 = volume.densities().map(u64::from).sum();
+        assert_eq!(erosions.removed(), 40 * 40 * 30 * 255 - missing);
+        erosions.removed() as f32
+    };
+    let once = removed(1, 10.0, 3_000.0);
+    assert!(once > 1_500.0, "{once}");
+    for calls in [2, 5, 20, 100, 1_000] {
+        let share = removed(calls, 10.0, 3_000.0) / once;
+        println!("{calls} calls: {share}");
+        assert!((share - 1.0).abs() < 0.03, "{calls} calls: {share}");
+    }
+    for (load, spin) in [(5.0, 3_000.0), (10.0, -1_500.0)] {
+        let share = removed(10, load, spin) / once;
+        assert!((share - 0.5).abs() < 0.02, "{share} at {load} N, {spin}/s");
+    }
+    for (load, spin) in [(0.0, 3e3), (10.0, 0.0), (f32::NAN, 3e3), (-1.0, 3e3), (1.0, f32::NAN)] {
+        assert_eq!(removed(3, load, spin), 0.0);
+    }
+    // More than there is.
+    assert!(removed(1, 1e9, 3e3) < 2.5 * removed(1, 100.0, 3e3));
+}
+
+#[test]
+fn two_bits_of_one_frame_may_come_in_any_order() {
+    let bone = bone_piece(96, Pose::IDENTITY).expect("96 voxels");
+    let top = TOP - Vec3::Z * 1e-3;
+    let burr = |bit, aside: Vec3, spin| Erode {
+        burr: Burr { bit, center: top + aside, axis: Vec3::Z, spin, side: None },
+        load: 9.0,
+    };
+    let bits = [
+        burr(Bit::BURR, Vec3::ZERO, 3e3),
+        burr(Bit::PERFORATOR, Vec3::new(2e-3, 1e-3, 3e-3), 1e2),
+        burr(Bit::CRANIOTOME, Vec3::new(-1e-3, 0.0, -4e-3), 5e3),
+    ];
+    let drilled = |order: [usize; 3]| {
+        let (mut volume, mut erosions) = (bone.clone(), Erosions::new());
+        for frame in 0..20 {
+            order.iter().for_each(|&bit| erosions.add(bits[bit]));
+            erosions.apply(&mut volume, frame, TIME);
+        }
+        (volume.digest(), erosions.removed())
+    };
+    let expected = drilled([0, 1, 2]);
+    assert!(expected.1 > 10_000);
+    for order in [[0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+        assert_eq!(drilled(order), expected);
+    }
+}
+
+#[test]
+fn a_rod_has_its_balls_along_the_axis() {
+    let burr = Burr { bit: Bit::CRANIOTOME, center: Vec3::X, axis: Vec3::Y, spin: 1.0, side: None };
+    let balls: Vec<Vec3> = burr.balls().collect();
+    assert_eq!(balls.len(), 9);
+    assert_eq!(balls[0], Vec3::X);
+    assert!((balls[8] - Vec3::new(1.0, Bit::CRANIOTOME.length, 0.0)).length() < 1e-7);
+    let ball = Burr { bit: Bit::BURR, ..burr };
+    assert_eq!(ball.balls().collect::<Vec<_>>(), [Vec3::X]);
+}
+
+#[test]
+fn a_hand_that_cannot_be() {
+    for values in [[0.0, 1.0, 1.0, 1.0], [1.0, -1.0, 1.0, 1.0], [1.0, 1.0, f32::NAN, 1.0]] {
+        let [strength, resistance, free, contact] = values;
+        assert!(Feed::new(strength, resistance, free, contact).is_err(), "{values:?}");
+    }
+    let error = Feed::new(1.0, 1.0, 1.0, f32::INFINITY).expect_err("an endless step");
+    assert_eq!(error.what, "a step in contact");
+}
