@@ -2,10 +2,9 @@
 
 use std::f32::consts::PI;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::proxy::{REACH, Surface};
-use crate::behavior::drill::Overlap;
 use crate::geometry::Volume;
 
 /// The radius of the ball by which bone is felt, in voxels; usually 3: a normal is then true to a degree
@@ -25,22 +24,43 @@ const STEPS: usize = 12;
 /// known but the side: the distance is infinite, and has no gradient.
 impl Surface for Volume {
     fn distance(&self, point: Vec3) -> (f32, Vec3) {
-        let radius = BALL * self.spacing().max_element();
-        let overlap = Overlap::new(self, point, radius, Vec3::Z, 0.0);
-        let share = overlap.volume / (FRAC_4_PI_3 * radius * radius * radius);
+        let Felt { radius, share, normal } = Felt::new(self, point);
         let seen = if share < LEAST_SHARE {
             nearest(self, point)
         } else if share > 1.0 - LEAST_SHARE {
             None
         } else {
-            overlap.normal(None).map(|normal| (radius * half_space(share), normal))
+            normal.map(|normal| (radius * half_space(share), normal))
         };
         seen.unwrap_or(((0.5 - share).signum() * f32::INFINITY, Vec3::ZERO))
     }
 }
 
-/// The volume of a ball of radius 1.
-const FRAC_4_PI_3: f32 = 4.0 / 3.0 * PI;
+/// What a ball feels.
+struct Felt {
+    /// The ball's, in metres.
+    radius: f32,
+    /// How much of it is bone.
+    share: f32,
+    /// Away from the bone's centre of mass, of unit length.
+    normal: Option<Vec3>,
+}
+
+impl Felt {
+    fn new(bone: &Volume, point: Vec3) -> Self {
+        let radius = BALL * bone.spacing().max_element();
+        let (mut mass, mut moment) = (0.0, DVec3::ZERO);
+        bone.visit(point, radius, |voxel| {
+            let part = f64::from(voxel.density) * f64::from(voxel.overlap);
+            mass += part;
+            moment += voxel.offset.as_dvec3() * part;
+        });
+        let ball = f64::from(255.0 * 4.0 / 3.0 * PI * radius * radius * radius);
+        let share = (mass * f64::from(bone.voxel_volume()) / ball) as f32;
+        let normal = (-moment).try_normalize().map(|normal| bone.turned(normal.as_vec3()));
+        Self { radius, share, normal }
+    }
+}
 
 /// How far a ball's middle is outside a half-space that fills so much of the ball, as a share of its
 /// radius: x³ − 3x + 2 = 4·share, solved by Newton's method.
@@ -62,8 +82,7 @@ fn nearest(bone: &Volume, point: Vec3) -> Option<(f32, Vec3)> {
     let hit = |direction: Vec3| Some((ray(bone, point, direction)?, direction));
     let (way, direction) = directions.filter_map(hit).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let place = point + direction * way;
-    let radius = BALL * bone.spacing().max_element();
-    let normal = Overlap::new(bone, place, radius, Vec3::Z, 0.0).normal(None).unwrap_or(-direction);
+    let normal = Felt::new(bone, place).normal.unwrap_or(-direction);
     Some(((point - place).dot(normal), normal))
 }
 

@@ -81,7 +81,8 @@ pub fn build(head: &Head) -> Result<Scene, BuildError> {
     for (number, structure) in head.structures.iter().enumerate() {
         objects.push(soft(number, structure)?);
     }
-    let mut skull = Object::new(SKULL, SKULL_GROUP, Geometry::Volume(head.skull.clone()), Bone::new());
+    let mut skull =
+        Object::new(SKULL, SKULL_GROUP, Geometry::Volume(head.skull.clone()), Bone::new());
     skull.visual = VisualProperties { color: IVORY };
     objects.push(skull);
     let stages = Stages {
@@ -97,7 +98,8 @@ pub fn build(head: &Head) -> Result<Scene, BuildError> {
 /// A tool that rests above the place of the operation.
 fn tool(id: ObjectId, head: &Head) -> Object {
     let outward = -head.plan.middle.inward;
-    let aside = outward.cross(Vec3::Z).normalize_or(Vec3::X) * if id == TOOLS[0] { 0.05 } else { -0.05 };
+    let aside =
+        outward.cross(Vec3::Z).normalize_or(Vec3::X) * if id == TOOLS[0] { 0.05 } else { -0.05 };
     let place = head.plan.middle.point + outward * 0.08 + aside;
     let tissue = |number: &usize| head.structures[*number].form == Form::Sheet;
     let workpieces = Workpieces {
@@ -134,7 +136,8 @@ fn soft(number: usize, structure: &Structure) -> Result<Object, BuildError> {
     let rest: Vec<Vec3> =
         positions.iter().map(|&place| place - (place - middle) * tension).collect();
     let (mut mesh, tissue) =
-        Tissue::new(&rest, triangles.clone(), material, *contact_radius, SUBSTEPS).map_err(refused)?;
+        Tissue::new(&rest, triangles.clone(), material, *contact_radius, SUBSTEPS)
+            .map_err(refused)?;
     for (node, &place) in positions.iter().enumerate() {
         mesh.positions.set(node, place);
     }
@@ -184,8 +187,7 @@ fn rules(head: &Head) -> Result<Rules, BuildError> {
         let attached = Attached::new(attachment.links.iter().map(link).collect());
         let loose = attachment.stiffness < LOOSE_LINK;
         let attached = if loose { attached.within(LOOSE_STRETCH) } else { attached };
-        let response =
-            Compliant::link(attachment.stiffness, LINK_DAMPING * attachment.stiffness)?;
+        let response = Compliant::link(attachment.stiffness, LINK_DAMPING * attachment.stiffness)?;
         let groups = [first, second].map(structure_group);
         model(groups[0], groups[1], Box::new(attached), Box::new(response))?;
     }

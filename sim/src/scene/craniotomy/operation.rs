@@ -38,10 +38,8 @@ impl Operation {
     /// An operation on a head, scripted as far as `step` says; without one nobody moves the hands.
     #[must_use]
     pub fn new(head: Arc<Head>, step: Option<Step>) -> Self {
-        let script = step.map_or_else(
-            || Script::new(TOOLS, TIME_STEP),
-            |step| steps::script(&head, step),
-        );
+        let script =
+            step.map_or_else(|| Script::new(TOOLS, TIME_STEP), |step| steps::script(&head, step));
         let region = region(&head);
         Self { head, script, score: Score::new(TIME_STEP), region, removed: 0 }
     }
@@ -142,11 +140,12 @@ impl Renderer for Watch<'_> {
 
 /// The box around the planned opening, through the skull.
 fn region(head: &Head) -> Bounds {
-    let places = head.plan.craniotomy.iter().flat_map(|&Entry { point, inward, thickness }| {
-        [point, point + inward * thickness]
-    });
-    let around = places.fold(Bounds::EMPTY, |bounds, place| {
-        bounds.union(&Bounds { min: place, max: place })
-    });
+    let places = head
+        .plan
+        .craniotomy
+        .iter()
+        .flat_map(|&Entry { point, inward, thickness }| [point, point + inward * thickness]);
+    let around = places
+        .fold(Bounds::EMPTY, |bounds, place| bounds.union(&Bounds { min: place, max: place }));
     around.inflated(MARGIN)
 }

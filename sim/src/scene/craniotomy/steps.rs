@@ -23,10 +23,10 @@ const DRAWING: f32 = 0.02;
 const SCRAPING: f32 = 0.05;
 /// How far from the incision the flap is scraped off, in metres; usually 30 mm.
 const SCRAPED: f32 = 0.03;
-/// How fast a craniotome is led, in metres per second; usually 0.004.
-const SAWING: f32 = 0.004;
-/// How far beyond the inner table a craniotome's tip is led, in metres; usually 1 mm.
-const BEYOND: f32 = 0.001;
+/// How fast a craniotome is led, in metres per second; usually 0.003.
+const SAWING: f32 = 0.003;
+/// How far beyond the inner table a craniotome's tip is led, in metres; usually 2 mm.
+const BEYOND: f32 = 0.002;
 /// How far beyond the bone a hand on a perforator would go, in metres.
 const LEANING: f32 = 0.03;
 /// How long it leans at most, in frames; usually 15 s.
@@ -108,7 +108,8 @@ fn rest(script: &mut Script, plan: &Plan) {
 fn incise(script: &mut Script, plan: &Plan) {
     let points = || plan.incision.iter().zip(&plan.incision_normals);
     let below: Vec<Vec3> = points().map(|(&point, &normal)| point - normal * DEEP).collect();
-    let (Some((&first, &axis)), Some((&last, &end))) = (points().next(), points().next_back()) else {
+    let (Some((&first, &axis)), Some((&last, &end))) = (points().next(), points().next_back())
+    else {
         return;
     };
     let (Some(&start), Some(&stop)) = (below.first(), below.last()) else { return };
@@ -132,7 +133,8 @@ fn retract(script: &mut Script, head: &Head) {
     let on_skin = |place: Vec3| place.normalize_or_zero() * head.skin_at(place);
     let lines = plan.incision.chunks(3).filter_map(|chunk| chunk.first());
     for (number, &from) in lines.enumerate() {
-        let steps = (0..=5).map(|step| on_skin(from + towards_base * (SCRAPED * step as f32 / 5.0)));
+        let steps =
+            (0..=5).map(|step| on_skin(from + towards_base * (SCRAPED * step as f32 / 5.0)));
         let mut path: Vec<Vec3> = steps.collect();
         if number % 2 == 1 {
             path.reverse();
@@ -187,7 +189,8 @@ fn saw(script: &mut Script, outline: &[Entry]) {
         let axis = pair[1].1;
         script.stroke(RIGHT, &Stroke { instrument, axis, path, speed: SAWING, pressed: true });
     }
-    script.wait(RIGHT, 60);
+    // The bit is behind the hand by as much as it takes to press it on.
+    script.wait(RIGHT, 120);
     script.stroke(RIGHT, &free(instrument, -first.inward, vec![tip(first), above]));
     script.meet();
 }
