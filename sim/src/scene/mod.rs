@@ -1,6 +1,8 @@
 //! Environments ready to run.
 
 mod bone;
+#[cfg(feature = "image")]
+pub mod head;
 mod particles;
 mod random;
 
