@@ -71,6 +71,13 @@ impl Piece {
         Self { seat: None, seated: false, ..self }
     }
 
+    /// The same piece turning with so much angular momentum, in kg·m²/s, in the world's axes.
+    #[must_use]
+    pub fn spinning(mut self, angular_momentum: Vec3) -> Self {
+        self.body.angular_momentum = angular_momentum;
+        self
+    }
+
     /// Whether it lies in its place.
     #[must_use]
     pub fn is_seated(&self) -> bool {

@@ -48,6 +48,14 @@ pub enum VolumeError {
         /// The distance between voxels along each axis, in metres.
         spacing: [f32; 3],
     },
+    /// A part does not lie in the volume that it is to be taken out of.
+    #[error("a part that ends at voxel {ends:?} of a volume of {dims:?} voxels")]
+    NoSuchPart {
+        /// Where it ends along each axis.
+        ends: [u32; 3],
+        /// The voxels along each axis.
+        dims: [u32; 3],
+    },
 }
 
 /// A grid of voxels, each filled to some part, with a pose.

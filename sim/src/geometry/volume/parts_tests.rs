@@ -3,6 +3,7 @@ use std::time::Instant;
 use glam::{Quat, Vec3};
 use parry3d::math::Pose;
 
+use super::super::VolumeError;
 use super::super::bricks::boxed;
 use super::*;
 use crate::mix::mix;
@@ -48,7 +49,7 @@ fn a_closed_cut_frees_one_disc() {
     let expected = std::f32::consts::PI * 18.5 * 18.5;
     assert!((area / expected - 1.0).abs() < 0.02, "{area} voxels, {expected} expected");
     assert_eq!(disc.bounds()[2], 2..12);
-    let piece = volume.split_off(&disc);
+    let piece = volume.split_off(&disc).expect("its own part");
     assert_eq!(mass(&volume) + mass(&piece), before, "nothing is lost or doubled");
     assert!(mass(&piece) as f32 > disc.voxels() as f32 * 240.0);
     // What is there is where it was, in the one or the other.
@@ -78,6 +79,9 @@ fn a_cut_that_is_not_closed_frees_nothing() {
     let parts = volume.parts(whole(&volume));
     assert_eq!(parts.len(), 1);
     assert!(parts[0].touches_border());
+    let mut smaller = build([59, 60, 14], |_| 255);
+    let error = smaller.split_off(&parts[0]).expect_err("a part of another volume");
+    assert_eq!(error, VolumeError::NoSuchPart { ends: [60, 60, 12], dims: [59, 60, 14] });
 }
 
 #[test]
@@ -122,7 +126,7 @@ fn the_rim_goes_to_the_nearer_part() {
     let before = mass(&volume);
     let parts = volume.parts(whole(&volume));
     assert_eq!(parts.iter().map(Part::voxels).collect::<Vec<_>>(), [2_592, 2_592, 2]);
-    let piece = volume.split_off(&parts[0]);
+    let piece = volume.split_off(&parts[0]).expect("its own part");
     assert_eq!(mass(&piece) + mass(&volume), before);
     // Six grains of twelve, and the chip.
     assert_eq!(mass(&piece), 2_592 * 255 + 6 * 40 + 2 * 200);
@@ -161,7 +165,7 @@ fn the_same_parts_as_a_flood() {
         for part in &parts {
             let mut volume = volume.clone();
             let before = mass(&volume);
-            let piece = volume.split_off(part);
+            let piece = volume.split_off(part).expect("its own part");
             assert_eq!(mass(&piece) + mass(&volume), before, "seed {seed}");
         }
     }
@@ -171,17 +175,21 @@ fn the_same_parts_as_a_flood() {
 #[test]
 fn a_large_box() {
     let volume = build([200, 200, 100], |[x, y, z]| {
-        let walls = (x / 3 + y / 4 + z / 5) % 4 > 0;
-        let cut = (i64::from(x) - 100).pow(2) + (i64::from(y) - 100).pow(2) - 60 * 60;
-        if walls && !(-150..150).contains(&cut) { 255 } else { 30 }
+        let aside = (i64::from(x) - 100).pow(2) + (i64::from(y) - 100).pow(2);
+        let pore = mix(u64::from(x / 4) << 40 | u64::from(y / 4) << 20 | u64::from(z / 4)) % 3 == 0;
+        match (aside - 60 * 60).abs() < 200 || !(20..70).contains(&z) {
+            true => 0,
+            false if pore && (30..60).contains(&z) => 60,
+            false => 255,
+        }
     });
     let began = Instant::now();
     let parts = volume.parts(whole(&volume));
     let found = began.elapsed();
-    let (mut left, part) = (volume, parts.iter().find(|part| !part.touches_border()));
-    let part = part.unwrap_or(&parts[1]).clone();
+    let (mut left, part) = (volume, parts[1].clone());
+    assert!(parts[0].touches_border() && !part.touches_border());
     let began = Instant::now();
-    let piece = left.split_off(&part);
+    let piece = left.split_off(&part).expect("its own part");
     println!(
         "{} parts in {found:?}; {} voxels split off in {:?}",
         parts.len(),

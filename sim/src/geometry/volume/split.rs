@@ -1,18 +1,17 @@
 //! A part of a volume becomes a volume of its own.
 
-use std::collections::VecDeque;
 use std::ops::Range;
 
 use glam::Vec3;
 use parry3d::math::Pose;
 
-use super::Volume;
-use super::bricks::{Bricks, Layout, boxed};
+use super::bricks::{Bricks, Layout};
 use super::parts::Part;
+use super::{Volume, VolumeError};
 
-/// How far around a part, in voxels, its rim and what else claims it are looked for; usually 8, which is
-/// more than a surface is wide and than a pore of the diploe at 0.5 mm.
-const MARGIN: u32 = 8;
+/// How far around a part's box, in voxels, its rim and what else claims it are looked for; usually 16: more
+/// than twice the width of a surface, and of a pore of the diploe at 0.5 mm.
+const MARGIN: u32 = 16;
 /// A part of fewer voxels is a chip: it has no rim of its own but belongs to that of what it hangs on by
 /// voxels less than half full. Usually 512: 64 mm³ at 0.5 mm.
 const CHIP: u64 = 512;
@@ -29,13 +28,19 @@ impl Volume {
     /// Takes a part out: its voxels become a volume of their own at the same place, and are empty here.
     ///
     /// With them goes the rim of voxels less than half full, and the chips in it, as far as they hang
-    /// on this part and are closer to it than to what else is solid, counted in steps from voxel to voxel by
-    /// their faces. Every density goes whole to the one or stays whole in the other, so their sum is the
+    /// on this part and are no closer to what else is solid, counted in steps from voxel to voxel by their
+    /// faces. Every density goes whole to the one or stays whole in the other, so their sum is the
     /// same as before.
     ///
-    /// The part must have been found in this volume as it is now; of one that was drilled since, what
-    /// is left goes.
-    pub fn split_off(&mut self, part: &Part) -> Self {
+    /// The part must have been found in this volume. What was drilled of it since is missing.
+    ///
+    /// # Errors
+    /// [`VolumeError::NoSuchPart`] for a part of another volume that reaches beyond this one's grid.
+    pub fn split_off(&mut self, part: &Part) -> Result<Self, VolumeError> {
+        let (ends, dims) = (part.bounds().map(|range| range.end), self.dims());
+        if (0..3).any(|axis| ends[axis] > dims[axis]) {
+            return Err(VolumeError::NoSuchPart { ends, dims });
+        }
         let claim = Claim::new(self, part);
         let owned = |voxel: [u32; 3]| claim.owner(voxel) == Owner::Part;
         let bounds = claim.bounds();
@@ -52,27 +57,31 @@ impl Volume {
         let corner = Vec3::from_array(first.map(|index| index as f32)) * self.spacing;
         let pose = Pose::from_parts(self.to_world(corner), self.pose.rotation);
         self.bricks.lower(&bounds, |voxel, density| if owned(voxel) { density } else { 0 });
-        Self { bricks, spacing: self.spacing, pose, velocity: self.velocity }
+        Ok(Self { bricks, spacing: self.spacing, pose, velocity: self.velocity })
     }
 }
 
-/// Whose the voxels around a part are.
+/// Whose the voxels around a part are. Around the region there is a layer of empty voxels, so that every
+/// voxel in it has neighbours.
 struct Claim {
     region: [Range<u32>; 3],
+    densities: Vec<u8>,
     owners: Vec<Owner>,
-    bounds: [Range<u32>; 3],
+    /// The voxels that somebody owns, in the order in which they were claimed.
+    owned: Vec<u32>,
 }
 
 impl Claim {
     fn new(volume: &Volume, part: &Part) -> Self {
         let (dims, around) = (volume.dims(), part.bounds());
-        let region = std::array::from_fn(|axis| {
+        let region: [Range<u32>; 3] = std::array::from_fn(|axis| {
             let Range { start, end } = around[axis];
             start.saturating_sub(MARGIN)..(end + MARGIN).min(dims[axis])
         });
-        let cells = region.iter().map(Range::len).product();
-        let bounds = part.bounds();
-        let mut claim = Self { region, owners: vec![Owner::Nobody; cells], bounds };
+        let cells = region.iter().map(|range| range.len() + 2).product();
+        let (densities, owners) = (vec![0; cells], vec![Owner::Nobody; cells]);
+        let mut claim = Self { region, densities, owners, owned: Vec::new() };
+        claim.copy(volume);
         claim.mark(part, Owner::Part);
         for other in volume.parts(claim.region.clone()) {
             let run = &other.runs()[0];
@@ -81,63 +90,79 @@ impl Claim {
                 claim.mark(&other, Owner::Rest);
             }
         }
-        claim.spread(volume);
+        claim.spread();
         claim
     }
 
-    /// The box around what is the part's.
-    fn bounds(&self) -> [Range<u32>; 3] {
-        self.bounds.clone()
+    /// From a voxel to the next along each axis.
+    fn strides(&self) -> [usize; 3] {
+        let [wide, high, _] = self.region.each_ref().map(|range| range.len() + 2);
+        [1, wide, wide * high]
     }
 
-    fn cell(&self, voxel: [u32; 3]) -> Option<usize> {
-        let inside = (0..3).all(|axis| self.region[axis].contains(&voxel[axis]));
-        let [x, y, z]: [usize; 3] =
-            std::array::from_fn(|axis| voxel[axis].wrapping_sub(self.region[axis].start) as usize);
-        let [wide, high, _] = self.region.each_ref().map(Range::len);
-        inside.then(|| (z * high + y) * wide + x)
+    fn cell(&self, voxel: [u32; 3]) -> usize {
+        let strides = self.strides();
+        let along = |axis: usize| (voxel[axis] - self.region[axis].start + 1) as usize;
+        (0..3).map(|axis| along(axis) * strides[axis]).sum()
     }
 
     fn owner(&self, voxel: [u32; 3]) -> Owner {
-        self.cell(voxel).map_or(Owner::Nobody, |cell| self.owners[cell])
+        let inside = (0..3).all(|axis| self.region[axis].contains(&voxel[axis]));
+        if inside { self.owners[self.cell(voxel)] } else { Owner::Nobody }
+    }
+
+    /// Takes over the densities.
+    fn copy(&mut self, volume: &Volume) {
+        let [xs, ys, zs] = self.region.clone();
+        for (z, y) in zs.flat_map(|z| ys.clone().map(move |y| (z, y))) {
+            for (x, row) in volume.bricks.row(xs.clone(), y, z) {
+                let first = self.cell([x, y, z]);
+                self.densities[first..first + row.len()].copy_from_slice(row);
+            }
+        }
     }
 
     fn mark(&mut self, part: &Part, owner: Owner) {
         for run in part.runs() {
-            for x in run.xs.clone() {
-                if let Some(cell) = self.cell([x, run.y, run.z]) {
-                    self.owners[cell] = owner;
-                }
-            }
+            let first = self.cell([run.xs.start, run.y, run.z]);
+            let cells = first..first + run.xs.len();
+            self.owners[cells.clone()].fill(owner);
+            self.owned.extend(cells.map(|cell| cell as u32));
         }
     }
 
     /// Gives every voxel that is not empty to whom it can be reached from in the fewest steps; at equal
-    /// distance to whom the search comes from first, in the order of the voxels.
-    fn spread(&mut self, volume: &Volume) {
-        let owned = |voxel: &[u32; 3]| self.owner(*voxel) != Owner::Nobody;
-        let mut front: VecDeque<[u32; 3]> = boxed(self.region.clone()).filter(owned).collect();
-        while let Some(voxel) = front.pop_front() {
-            let owner = self.owner(voxel);
-            for (axis, step) in [(0, -1), (0, 1), (1, -1), (1, 1), (2, -1), (2, 1)] {
-                let mut next = voxel;
-                next[axis] = next[axis].wrapping_add_signed(step);
-                let Some(cell) = self.cell(next) else { continue };
-                let density = volume.bricks.get(next.map(|index| index as i32));
-                if self.owners[cell] == Owner::Nobody && density > 0 {
-                    self.owners[cell] = owner;
-                    self.widen(next, owner);
-                    front.push_back(next);
+    /// distance to the part.
+    fn spread(&mut self) {
+        let strides = self.strides();
+        let mut next = 0;
+        while let Some(&cell) = self.owned.get(next) {
+            next += 1;
+            let cell = cell as usize;
+            for stride in strides {
+                for neighbour in [cell - stride, cell + stride] {
+                    let free = self.owners[neighbour] == Owner::Nobody;
+                    if free && self.densities[neighbour] > 0 {
+                        self.owners[neighbour] = self.owners[cell];
+                        self.owned.push(neighbour as u32);
+                    }
                 }
             }
         }
     }
 
-    fn widen(&mut self, voxel: [u32; 3], owner: Owner) {
-        if owner == Owner::Part {
-            for (bounds, index) in self.bounds.iter_mut().zip(voxel) {
-                *bounds = bounds.start.min(index)..bounds.end.max(index + 1);
+    /// The box around what is the part's.
+    fn bounds(&self) -> [Range<u32>; 3] {
+        let [_, wide, flat] = self.strides();
+        let mut bounds = std::array::from_fn(|_| u32::MAX..0);
+        let cells = self.owned.iter().map(|&cell| cell as usize);
+        for cell in cells.filter(|&cell| self.owners[cell] == Owner::Part) {
+            let place = [cell % wide, cell % flat / wide, cell / flat];
+            for (axis, range) in bounds.iter_mut().enumerate() {
+                let index = place[axis] as u32 + self.region[axis].start - 1;
+                *range = index.min(range.start)..range.end.max(index + 1);
             }
         }
+        bounds
     }
 }

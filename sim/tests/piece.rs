@@ -1,0 +1,265 @@
+//! A free piece of bone: how it falls, rests, is lifted and put back.
+
+mod common;
+
+use std::any::Any;
+
+use common::{no_rules, run, serial};
+use dualframe_sim::behavior::piece::{BONE_DENSITY, Grasp, Hold, LetGo, Piece};
+use dualframe_sim::behavior::{Bone, Fixed};
+use dualframe_sim::executor::{Executor, SerialExecutor};
+use dualframe_sim::geometry::{Geometry, Volume};
+use dualframe_sim::interaction::{InteractionPair, PieceInBone, PieceOnBone};
+use dualframe_sim::message::Message;
+use dualframe_sim::object::{Group, Object, ObjectId};
+use dualframe_sim::scene::Scene;
+use dualframe_sim::stages::Stages;
+use glam::{Quat, Vec3};
+use parry3d::math::Pose;
+
+const TIME: f32 = 1.0 / 60.0;
+const SPACING: f32 = 5e-4;
+const TOOL: ObjectId = ObjectId(9);
+
+/// A box of full bone, of so many voxels, within its grid.
+fn plate(voxels: [u32; 3], pose: Pose) -> Volume {
+    let inside = |voxel: [u32; 3]| (0..3).all(|axis| (1..=voxels[axis]).contains(&voxel[axis]));
+    let dims = voxels.map(|side| side + 2);
+    Volume::from_fn(dims, Vec3::splat(SPACING), pose, |voxel| if inside(voxel) { 255 } else { 0 })
+        .expect("it is small")
+}
+
+/// A flat floor of bone whose surface is at z = 0.
+fn floor() -> Object {
+    let at = Pose::from_translation(Vec3::new(-0.05, -0.05, -0.010_5));
+    let volume = plate([200, 200, 20], at);
+    Object::new(ObjectId(1), Group(1), Geometry::Volume(volume), Bone::new())
+}
+
+fn stages(gravity: f32) -> Stages {
+    let mut stages = Stages { time_step: TIME, gravity: Vec3::NEG_Z * gravity, ..no_rules() };
+    let pair = InteractionPair {
+        detection: Box::new(PieceInBone { time_step: TIME }),
+        response: Box::new(PieceOnBone { friction: 0.4 }),
+    };
+    stages.rules.model(Group(0), Group(1), pair).expect("its first rule");
+    stages
+}
+
+/// A plate of 20 × 15 × 4 mm.
+fn flap(pose: Pose) -> Volume {
+    plate([40, 30, 8], pose)
+}
+
+fn scene(volume: Volume, loose: bool, others: Vec<Object>, gravity: f32) -> SerialExecutor {
+    let piece = Piece::new(&volume);
+    let piece = if loose { piece.loose() } else { piece };
+    let mut objects = vec![Object::new(ObjectId(0), Group(0), Geometry::Volume(volume), piece)];
+    objects.extend(others);
+    serial(Scene::new(objects, stages(gravity)))
+}
+
+fn look<T>(executor: &SerialExecutor, look: impl Fn(&Piece, &Volume) -> T) -> T {
+    let mut seen = None;
+    executor.visit(&mut |object| {
+        let behavior: &dyn Any = &*object.behavior;
+        if let (Some(piece), Some(volume)) = (behavior.downcast_ref(), object.geometry.as_volume())
+        {
+            seen = Some(look(piece, volume));
+        }
+    });
+    seen.expect("one piece")
+}
+
+fn center(executor: &SerialExecutor) -> Vec3 {
+    look(executor, |piece, volume| piece.body().center(volume))
+}
+
+/// The lowest point of the piece, in metres.
+fn lowest(executor: &SerialExecutor) -> f32 {
+    look(executor, |piece, volume| {
+        let heights = piece.samples().iter().map(|&sample| volume.to_world(sample).z);
+        heights.fold(f32::MAX, f32::min) - 0.5 * SPACING
+    })
+}
+
+fn post(executor: &SerialExecutor, message: impl dualframe_sim::message::Custom + 'static) {
+    executor.mailbox().post(ObjectId(0), Message::Custom(Box::new(message)));
+}
+
+fn turned() -> Quat {
+    Quat::from_rotation_x(0.5) * Quat::from_rotation_y(0.3)
+}
+
+#[test]
+fn mass_and_inertia_of_a_plate() {
+    let volume = flap(Pose::from_parts(Vec3::ONE, turned()));
+    let mut piece = Piece::new(&volume).loose();
+    let body = *piece.body();
+    let sides = Vec3::new(20e-3, 15e-3, 4e-3);
+    let mass = sides.element_product() * BONE_DENSITY as f32;
+    assert!((body.mass / mass - 1.0).abs() < 1e-4, "{} kg", body.mass);
+    assert!((body.center(&volume) - volume.center()).length() < 1e-6);
+    let squares = sides * sides;
+    let inertia = (Vec3::splat(squares.element_sum()) - squares) * (mass / 12.0);
+    // From a momentum about each of the plate's own axes.
+    for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+        piece = piece.spinning(volume.turned(axis));
+        let spin = piece.body().angular_velocity(&volume);
+        let expected = volume.turned(axis / inertia);
+        assert!((spin - expected).length() < 1e-3 * expected.length(), "{spin}, not {expected}");
+    }
+    assert!((100..=300).contains(&piece.samples().len()), "{}", piece.samples().len());
+}
+
+#[test]
+fn falls_freely() {
+    let mut executor = scene(flap(Pose::from_translation(Vec3::Z)), true, vec![], 9.81);
+    let start = center(&executor);
+    run(&mut executor, 60);
+    let fallen = start - center(&executor);
+    // Half of g·t², and what the air takes.
+    assert!((fallen.z / 4.905 - 1.0).abs() < 0.04, "{fallen}");
+    assert!(fallen.truncate().length() < 1e-6);
+}
+
+#[test]
+fn keeps_its_momentum() {
+    let volume = flap(Pose::from_parts(Vec3::Z, turned()));
+    let piece = Piece::new(&volume).loose().spinning(Vec3::new(2e-6, 3e-6, -4e-6));
+    let object = Object::new(ObjectId(0), Group(0), Geometry::Volume(volume), piece);
+    let mut executor = serial(Scene::new(vec![object], stages(0.0)));
+    let momentum =
+        |executor: &SerialExecutor| look(executor, |piece, _| piece.body().angular_momentum);
+    let (at, before) = (center(&executor), momentum(&executor));
+    run(&mut executor, 30);
+    let after = momentum(&executor);
+    assert!((after.normalize() - before.normalize()).length() < 1e-6, "{before}, {after}");
+    let kept = after.length() / before.length();
+    assert!((0.55..0.65).contains(&kept), "damped by 1/s: {kept}");
+    assert!((center(&executor) - at).length() < 1e-6, "its middle stays");
+    let pose = look(&executor, |_, volume| volume.pose);
+    let length: f32 = pose.rotation.to_array().iter().map(|part| part * part).sum();
+    assert!((length - 1.0).abs() < 1e-5);
+    assert!(pose.rotation.angle_between(turned()) > 0.1, "it turned");
+}
+
+#[test]
+fn rests_on_bone() {
+    for rotation in [Quat::IDENTITY, turned()] {
+        let pose = Pose::from_parts(Vec3::new(0.0, 0.0, 0.02), rotation);
+        let mut executor = scene(flap(pose), true, vec![floor()], 9.81);
+        let mut deepest = f32::MAX;
+        for _ in 0..300 {
+            run(&mut executor, 1);
+            deepest = deepest.min(lowest(&executor));
+        }
+        println!("deepest {deepest} m, now {} m", lowest(&executor));
+        assert!(deepest > -2.5e-4, "{deepest} m: it sinks in by half a voxel at most");
+        let (before, low) = (center(&executor), lowest(&executor));
+        assert!(low.abs() < 1.5e-4, "{low} m over the bone");
+        run(&mut executor, 120);
+        let moved = (center(&executor) - before).length();
+        assert!(moved < 1e-4, "{moved} m in two seconds of rest");
+        // Flat on its side.
+        assert!((before.z - 2e-3).abs() < 3e-4, "{before}");
+    }
+}
+
+#[test]
+fn does_not_fall_through() {
+    // From half a metre it comes at 3 m/s, 5 cm a frame, on 10 mm of bone.
+    let mut executor =
+        scene(flap(Pose::from_translation(Vec3::Z * 0.5)), true, vec![floor()], 9.81);
+    for _ in 0..240 {
+        run(&mut executor, 1);
+        assert!(lowest(&executor) > -2.5e-4, "{}", lowest(&executor));
+    }
+    assert!(center(&executor).z < 3e-3);
+}
+
+#[test]
+fn lies_in_its_place_until_it_is_pulled() {
+    let pose = Pose::from_translation(Vec3::new(0.0, 0.0, 0.1));
+    let mut executor = scene(flap(pose), false, vec![], 9.81);
+    let start = center(&executor);
+    run(&mut executor, 60);
+    assert_eq!(center(&executor), start, "nothing moves it");
+    let grasp =
+        Grasp { by: TOOL, point: start.to_array(), radius: 3e-3, stiffness: 1e3, strength: 20.0 };
+    let miss = Grasp { point: (start + Vec3::Z * 0.05).to_array(), by: ObjectId(8), ..grasp };
+    let invalid = Grasp { stiffness: f32::NAN, by: ObjectId(7), ..grasp };
+    [grasp, miss, invalid].into_iter().for_each(|grasp| post(&executor, grasp));
+    let hold = |executor: &SerialExecutor, up: f32| {
+        post(executor, Hold { by: TOOL, position: (start + Vec3::Z * up).to_array() });
+    };
+    hold(&executor, 2e-3);
+    run(&mut executor, 30);
+    assert_eq!(look(&executor, |piece, _| piece.holders().collect::<Vec<_>>()), [TOOL]);
+    assert_eq!(center(&executor), start, "2 N are too little");
+    hold(&executor, 0.03);
+    run(&mut executor, 120);
+    // It hangs by its weight over the stiffness.
+    let mass = look(&executor, |piece, _| piece.body().mass);
+    let off = start.z + 0.03 - center(&executor).z;
+    assert!((off - mass * 9.81 / 1e3).abs() < 2e-5, "{off} m off, {mass} kg");
+    assert!(look(&executor, |piece, _| !piece.is_seated()));
+    // Brought back near its place and let go of, it lies there as before.
+    hold(&executor, 1.5e-3);
+    run(&mut executor, 120);
+    assert!(look(&executor, |piece, _| !piece.is_seated()), "still held");
+    post(&executor, LetGo { by: TOOL });
+    run(&mut executor, 2);
+    assert_eq!(center(&executor), start);
+    assert!(look(&executor, |piece, _| piece.is_seated()));
+}
+
+#[test]
+fn a_piece_let_go_elsewhere_falls() {
+    let pose = Pose::from_translation(Vec3::new(0.0, 0.0, 0.1));
+    let mut executor = scene(flap(pose), false, vec![], 9.81);
+    let start = center(&executor);
+    let point = start.to_array();
+    post(&executor, Grasp { by: TOOL, point, radius: 3e-3, stiffness: 1e3, strength: 20.0 });
+    post(&executor, Hold { by: TOOL, position: (start + Vec3::X * 0.02).to_array() });
+    run(&mut executor, 60);
+    post(&executor, LetGo { by: TOOL });
+    run(&mut executor, 60);
+    assert!(center(&executor).z < start.z - 1.0);
+}
+
+/// A hand of 20 N presses a piece of 2 g on bone.
+#[test]
+fn is_not_pressed_into_bone() {
+    let pose = Pose::from_translation(Vec3::new(0.0, 0.0, 0.003));
+    let mut executor = scene(flap(pose), true, vec![floor()], 9.81);
+    let grip = center(&executor) + Vec3::new(7e-3, 4e-3, 0.0);
+    post(
+        &executor,
+        Grasp { by: TOOL, point: grip.to_array(), radius: 3e-3, stiffness: 2e3, strength: 20.0 },
+    );
+    post(&executor, Hold { by: TOOL, position: (grip - Vec3::Z * 0.02).to_array() });
+    for _ in 0..200 {
+        run(&mut executor, 1);
+        assert!(lowest(&executor) > -5e-4, "{} m", lowest(&executor));
+    }
+    let lifted = grip + Vec3::Z * 0.03;
+    post(&executor, Hold { by: TOOL, position: lifted.to_array() });
+    run(&mut executor, 120);
+    assert!(lowest(&executor) > 5e-3, "{}", lowest(&executor));
+}
+
+#[test]
+fn scenery_and_bone_ignore_hands() {
+    let mut other = floor();
+    other.behavior = Box::new(Fixed);
+    let mut executor = scene(flap(Pose::from_translation(Vec3::Z)), false, vec![other], 9.81);
+    for id in [1, 5] {
+        let message = LetGo { by: TOOL };
+        executor.mailbox().post(ObjectId(id), Message::Custom(Box::new(message)));
+        let grasp = Grasp { by: TOOL, point: [0.0; 3], radius: 1.0, stiffness: 1.0, strength: 1.0 };
+        executor.mailbox().post(ObjectId(id), Message::Custom(Box::new(grasp)));
+    }
+    run(&mut executor, 3);
+    assert!(look(&executor, |piece, _| piece.holders().next().is_none()));
+}
