@@ -26,7 +26,8 @@ pub(super) fn free(scene: &mut Scene, skull: ObjectId, region: &Bounds) -> usize
         let least = (LEAST / volume.voxel_volume()) as u64;
         let parts = volume.parts(voxels(volume, region));
         let free = parts.iter().filter(|part| !part.touches_border() && part.voxels() >= least);
-        freed.extend(free.map(|part| volume.split_off(part)));
+        // A part that cannot be taken out stays where it is.
+        freed.extend(free.filter_map(|part| volume.split_off(part).ok()));
     }
     let color = scene.objects.get(skull.0 as usize).map(|skull| skull.visual);
     let count = freed.len();
