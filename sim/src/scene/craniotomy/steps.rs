@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::script::{Script, Stroke};
 use super::{TIME_STEP, TOOLS};
 use crate::behavior::Instrument;
-use crate::scene::head::{Entry, Head, Plan};
+use crate::scene::head::{Entry, Head, Plan, Pull};
 
 /// The hand that cuts and drills.
 const RIGHT: usize = 0;
@@ -23,6 +23,8 @@ const DRAWING: f32 = 0.02;
 const SCRAPING: f32 = 0.05;
 /// How far from the incision the flap is scraped off, in metres; usually 30 mm.
 const SCRAPED: f32 = 0.03;
+/// How far beyond the plan's bite tissue is held, in metres; usually 4 mm.
+const FARTHER: f32 = 0.004;
 /// How fast a craniotome is led, in metres per second; usually 0.003.
 const SAWING: f32 = 0.003;
 /// How far beyond the inner table a craniotome's tip is led, in metres; usually 2 mm.
@@ -129,8 +131,14 @@ fn incise(script: &mut Script, plan: &Plan) {
 fn retract(script: &mut Script, head: &Head) {
     let plan = &head.plan;
     let (Some(flap), Some(margin)) = (plan.flap.get(1), plan.margin.first()) else { return };
-    let towards_base = (flap.to - flap.from).normalize_or_zero();
     let on_skin = |place: Vec3| place.normalize_or_zero() * head.skin_at(place);
+    // Farther from the wound than the instruments reach, so that they hold one lip and not both.
+    let bite = |pull: &Pull| {
+        let from = on_skin(pull.from + (pull.to - pull.from).normalize_or_zero() * FARTHER);
+        Pull { from, ..*pull }
+    };
+    let (flap, margin) = (bite(flap), bite(margin));
+    let towards_base = (flap.to - flap.from).normalize_or_zero();
     let lines = plan.incision.chunks(3).filter_map(|chunk| chunk.first());
     for (number, &from) in lines.enumerate() {
         let steps =
@@ -144,14 +152,14 @@ fn retract(script: &mut Script, head: &Head) {
         script.stroke(RIGHT, &Stroke { instrument, axis, path, speed: SCRAPING, pressed: true });
     }
     for (hand, instrument, pull) in
-        [(LEFT, Instrument::Hook, flap), (RIGHT, Instrument::Forceps, margin)]
+        [(LEFT, Instrument::Hook, &flap), (RIGHT, Instrument::Forceps, &margin)]
     {
         let axis = pull.from.normalize_or(Vec3::Y);
         script.stroke(hand, &free(instrument, axis, vec![pull.from + axis * AWAY, pull.from]));
     }
     script.meet();
     for (hand, instrument, pull) in
-        [(LEFT, Instrument::Hook, flap), (RIGHT, Instrument::Forceps, margin)]
+        [(LEFT, Instrument::Hook, &flap), (RIGHT, Instrument::Forceps, &margin)]
     {
         let axis = pull.from.normalize_or(Vec3::Y);
         let path = vec![pull.from, pull.to];
