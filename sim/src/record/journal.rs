@@ -10,6 +10,8 @@ use super::wire::Encoder;
 
 /// The bytes at the beginning of a chunk of events that say how many frames it goes up to.
 pub(super) const FRAMES: usize = 8;
+/// Bytes that can be taken down before memory has to grow; usually 64 KiB, for a second of some devices.
+const USUAL_BYTES: usize = 1 << 16;
 /// Characters of a message that cannot be recorded, in the error that names it.
 const SHOWN: usize = 80;
 
@@ -27,8 +29,10 @@ pub(crate) struct Journal {
 
 impl Journal {
     pub(super) fn new() -> Self {
+        let mut payload = Vec::with_capacity(USUAL_BYTES);
+        payload.resize(FRAMES, 0);
         Self {
-            payload: vec![0; FRAMES],
+            payload,
             order: Order::default(),
             totals: Totals::default(),
             is_over: false,

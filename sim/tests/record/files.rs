@@ -117,3 +117,28 @@ fn what_is_no_recording() {
     let error = error.expect("a byte too many").to_string();
     assert!(error.starts_with("it goes on after its end; in chunk "), "{error}");
 }
+
+#[test]
+fn files_that_another_program_has_written() {
+    // The fuzzer's seeds, made from the description of the format alone.
+    let seed = |name: &str| {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/fuzz/seeds/recording/");
+        let file = std::fs::read(folder.to_owned() + name).expect("a seed");
+        read(&file)
+    };
+    let (events, error) = seed("all.rec");
+    assert!(error.is_none(), "{error:?}");
+    assert_eq!(events.len(), 9 + 3 + 2);
+    assert_eq!(
+        events[5],
+        "Letter { due: 2, to: ObjectId(0), message: Stiffness { between_nodes: 60.0, to_center: 300.0 } }"
+    );
+    assert_eq!(events[13], "Stop { frame: 27, stop: Objects([115, 112, 101, 99]) }");
+    let (events, error) = seed("packed.rec");
+    assert!(error.is_none(), "{error:?}");
+    assert_eq!(events.len(), 90);
+    let (events, error) = seed("cut.rec");
+    assert_eq!(events.len(), 2);
+    let error = error.expect("it is cut").to_string();
+    assert!(error.starts_with("it is cut off; in chunk 3 at byte 168, after 60 "), "{error}");
+}
