@@ -155,7 +155,7 @@ fn rests_on_bone() {
             deepest = deepest.min(lowest(&executor));
         }
         println!("deepest {deepest} m, now {} m", lowest(&executor));
-        assert!(deepest > -2.5e-4, "{deepest} m: it sinks in by half a voxel at most");
+        assert!(deepest > -5e-4, "{deepest} m: it sinks in by a voxel at most");
         let (before, low) = (center(&executor), lowest(&executor));
         assert!(low.abs() < 1.5e-4, "{low} m over the bone");
         run(&mut executor, 120);

@@ -97,13 +97,13 @@ impl Geometry {
         }
     }
 
-    /// The box around it, contact spheres included.
+    /// The box around it, contact spheres and a volume's margin included.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         match self {
             Self::Mesh(mesh) => mesh.bounds(),
             Self::Rigid(rigid) => rigid.bounds(),
-            Self::Volume(volume) => volume.bounds(),
+            Self::Volume(volume) => volume.bounds().inflated(volume.margin),
         }
     }
 

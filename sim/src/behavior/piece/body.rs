@@ -92,6 +92,12 @@ impl Body {
         volume.turned(self.inverse_inertia * volume.turned_back(self.angular_momentum))
     }
 
+    /// How fast any point of the volume moves at most, in metres per second.
+    pub(super) fn fastest(&self, volume: &Volume) -> f32 {
+        let spin = self.angular_velocity(volume).length();
+        self.velocity.length() + spin * volume.extent().length()
+    }
+
     /// Changes the motion by an impulse (newton seconds) at a place seen from the centre of mass (metres).
     pub(super) fn push(&mut self, impulse: Vec3, at: Vec3) {
         self.velocity += impulse * self.inverse_mass();

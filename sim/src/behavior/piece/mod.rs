@@ -161,6 +161,7 @@ impl Behavior for Piece {
             self.body.angular_momentum *= around;
             self.hands.pull(&mut self.body, volume, time);
         }
+        volume.margin = if self.seated { 0.0 } else { self.body.fastest(volume) * time };
     }
 
     fn erosions(&mut self) -> Option<&mut Erosions> {

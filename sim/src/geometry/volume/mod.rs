@@ -74,6 +74,9 @@ pub struct Volume {
     pub pose: Pose,
     /// How fast it moves, in metres per second.
     pub velocity: Vec3,
+    /// How far beyond its grid interactions are to look for it, in metres: the way that it is about to go,
+    /// for what stops it beforehand. Usually 0.
+    pub margin: f32,
 }
 
 impl Volume {
@@ -119,7 +122,7 @@ impl Volume {
     ) -> Result<Self, VolumeError> {
         check(dims, spacing)?;
         let bricks = Bricks::from_fn(Layout { dims }, density);
-        Ok(Self { bricks, spacing, pose, velocity: Vec3::ZERO })
+        Ok(Self { bricks, spacing, pose, velocity: Vec3::ZERO, margin: 0.0 })
     }
 
     /// The voxels along x, y and z.
@@ -246,10 +249,10 @@ impl Volume {
         })
     }
 
-    /// Whether pose and velocity are finite.
+    /// Whether pose, velocity and margin are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.pose.is_finite() && self.velocity.is_finite()
+        self.pose.is_finite() && self.velocity.is_finite() && self.margin.is_finite()
     }
 
     /// A point (metres) in the volume's own axes.
@@ -305,6 +308,7 @@ impl Volume {
         self.spacing = other.spacing;
         self.pose = other.pose;
         self.velocity = other.velocity;
+        self.margin = other.margin;
     }
 
     fn ball(&self, center: Vec3, radius: f32) -> Ball {

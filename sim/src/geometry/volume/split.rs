@@ -57,7 +57,7 @@ impl Volume {
         let corner = Vec3::from_array(first.map(|index| index as f32)) * self.spacing;
         let pose = Pose::from_parts(self.to_world(corner), self.pose.rotation);
         self.bricks.lower(&bounds, |voxel, density| if owned(voxel) { density } else { 0 });
-        Ok(Self { bricks, spacing: self.spacing, pose, velocity: self.velocity })
+        Ok(Self { bricks, spacing: self.spacing, pose, velocity: self.velocity, margin: 0.0 })
     }
 }
 
