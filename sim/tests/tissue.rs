@@ -332,7 +332,8 @@ fn what_is_held_too_weakly_slips_off() {
         look(&executor, |tissue, _| tissue.held_nodes(TOOL))
     };
     assert_eq!(held(0.5), 0);
-    assert_eq!(held(5.0), 7);
+    // The outer ones bear more, and more while it swings.
+    assert_eq!(held(20.0), 7);
 }
 
 #[test]
