@@ -94,7 +94,7 @@ impl Kernel for Advance<'_> {
             {
                 *before = *position;
                 for axis in 0..4 {
-                    velocity[axis] = (velocity[axis] + self.fall[axis]) * self.decay;
+                    velocity[axis] = velocity[axis] * self.decay + self.fall[axis];
                     position[axis] += velocity[axis] * self.time;
                 }
             }

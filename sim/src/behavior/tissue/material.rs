@@ -25,7 +25,7 @@ pub struct Material {
     /// 0 for a sheet, and `stiffness` for a solid body.
     pub to_center: f32,
     /// The rate at which velocities decay, per second: a substep of h seconds divides them by
-    /// 1 + damping·h. Usually 1 to 10: tissue lies in tissue.
+    /// 1 + damping·h before gravity acts. Usually 1 to 10: tissue lies in tissue.
     pub damping: f32,
     /// The mass of the surface, in kilograms per square metre: density times thickness; usually 0.5
     /// (dura) to 6.6 (scalp), and for a solid body its mass over its surface.

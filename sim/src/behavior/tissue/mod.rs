@@ -117,8 +117,11 @@ impl Tissue {
                 return Err(TissueError::NoSuchNode { node, nodes });
             }
             check("a pin's point", if point.is_finite() { 0.0 } else { f32::NAN })?;
-            check("a pin's stiffness", stiffness.min(f32::MAX))?;
-            check("a pin's strength", strength.min(f32::MAX))?;
+            for (what, value) in [("a pin's stiffness", stiffness), ("a pin's strength", strength)]
+            {
+                // Infinite is as good as the greatest; no number is not.
+                check(what, if value == f32::INFINITY { f32::MAX } else { value })?;
+            }
         }
         self.anchors.pins = pins;
         Ok(self)

@@ -44,7 +44,7 @@ pub(crate) struct CutSurface {
     pub(crate) slits: Vec<[u32; 2]>,
     /// Where each node that was added comes from, in order.
     pub(crate) births: Vec<Birth>,
-    /// No edge is divided into parts shorter than this at rest, in metres.
+    /// No edge is made that is shorter than this at rest, in metres.
     pub(crate) shortest: f32,
 }
 
@@ -87,46 +87,52 @@ impl CutSurface {
         }
     }
 
+    /// How near a side a crossing is moved to its end, or a node to the side, as a share.
+    fn snap(&self, side: [u32; 2]) -> f64 {
+        if self.count(side) == 1 { BORDER_SNAP } else { SNAP }
+    }
+
     /// The node on an edge at a share of the way: one of its ends, if that is near, or a new one.
     pub(super) fn node_on(&mut self, [p, q]: [u32; 2], share: f64) -> u32 {
-        let snap = if self.count([p, q]) == 1 { BORDER_SNAP } else { SNAP };
-        let [a, b] = [p, q].map(|node| self.nodes[node as usize].rest);
-        let least = snap.max(f64::from(self.shortest) / f64::from((b - a).length()));
+        let node = self.between([p, q], share as f32);
         let near = share.min(1.0 - share);
-        // Also for what is no number.
-        if !(near >= least) {
+        let both = self.fan(p).filter(|&place| self.triangles[place].contains(&q));
+        let around: Vec<u32> = both.flat_map(|place| self.triangles[place]).collect();
+        // Negated so that what is no number makes no node.
+        if !(near >= self.snap([p, q])) || self.is_crowded(&node, &around) {
             return if share < 0.5 { p } else { q };
         }
-        self.split_edge([p, q], share as f32)
+        self.split_edge([p, q], share as f32, node)
     }
 
     /// The node at a point of a triangle, given by its corners' shares: on a side, if that is near, or a
     /// new one.
-    pub(super) fn node_in(&mut self, triangle: usize, shares: [f64; 3]) -> u32 {
-        let corners = self.triangles[triangle];
-        let distance = |corner: usize| {
-            let [p, q] = [corners[(corner + 1) % 3], corners[(corner + 2) % 3]];
-            let snap = if self.count([p, q]) == 1 { BORDER_SNAP } else { SNAP };
-            (shares[corner] / snap, corner)
-        };
-        let distances = [distance(0), distance(1), distance(2)];
-        let (nearest, corner) =
-            distances.into_iter().fold((f64::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a });
-        if nearest < 1.0 || self.is_small(corners) {
+    pub(super) fn node_in(&mut self, place: usize, shares: [f64; 3]) -> u32 {
+        let corners = self.triangles[place];
+        let distances = [0, 1, 2].map(|corner| {
+            let side = [corners[(corner + 1) % 3], corners[(corner + 2) % 3]];
+            (shares[corner] / self.snap(side), corner)
+        });
+        let nearer = |a: (f64, usize), b: (f64, usize)| if b.0 < a.0 { b } else { a };
+        let (nearest, corner) = distances.into_iter().fold((f64::INFINITY, 0), nearer);
+        let in_32_bits = shares.map(|share| share as f32);
+        let node = Node::mix(corners.map(|node| self.nodes[node as usize]), in_32_bits);
+        if nearest < 1.0 || self.is_crowded(&node, &corners) {
             let [p, q] = [(corner + 1) % 3, (corner + 2) % 3];
             let share = shares[q] / (shares[p] + shares[q]);
             return self.node_on([corners[p], corners[q]], share);
         }
-        self.split_triangle(triangle, shares.map(|share| share as f32))
+        self.split_triangle(place, in_32_bits, node)
     }
 
-    /// Whether a node within a triangle would make edges that are too short.
-    fn is_small(&self, corners: [u32; 3]) -> bool {
-        let [a, b, c] = corners.map(|node| self.nodes[node as usize].rest);
-        let longest = (b - a).length().max((c - b).length()).max((a - c).length());
-        let area = 0.5 * (b - a).cross(c - a).length();
-        // A node in the middle is a third of the height from a side.
-        2.0 * area < 3.0 * self.shortest * longest
+    fn between(&self, ends: [u32; 2], share: f32) -> Node {
+        Node::mix(ends.map(|node| self.nodes[node as usize]), [1.0 - share, share])
+    }
+
+    /// Whether an edge from a new node to one of those around would be too short.
+    fn is_crowded(&self, node: &Node, around: &[u32]) -> bool {
+        let distance = |&other: &u32| (self.nodes[other as usize].rest - node.rest).length();
+        around.iter().map(distance).any(|distance| distance < self.shortest)
     }
 
     fn add(&mut self, node: Node, birth: Birth) -> u32 {
@@ -135,9 +141,7 @@ impl CutSurface {
         (self.nodes.len() - 1) as u32
     }
 
-    fn split_edge(&mut self, [p, q]: [u32; 2], share: f32) -> u32 {
-        let ends = [p, q].map(|node| self.nodes[node as usize]);
-        let node = Node::mix(ends, [1.0 - share, share]);
+    fn split_edge(&mut self, [p, q]: [u32; 2], share: f32, node: Node) -> u32 {
         let new = self.add(node, Birth::Between([p, q], share));
         let both: Vec<usize> =
             self.fan(p).filter(|&place| self.triangles[place].contains(&q)).collect();
@@ -154,9 +158,8 @@ impl CutSurface {
         new
     }
 
-    fn split_triangle(&mut self, place: usize, shares: [f32; 3]) -> u32 {
+    fn split_triangle(&mut self, place: usize, shares: [f32; 3], node: Node) -> u32 {
         let [a, b, c] = self.triangles[place];
-        let node = Node::mix([a, b, c].map(|node| self.nodes[node as usize]), shares);
         let new = self.add(node, Birth::Inside([a, b, c], shares));
         self.triangles[place] = [a, b, new];
         self.triangles.extend([[b, c, new], [c, a, new]]);

@@ -64,54 +64,70 @@ impl CutSurface {
     /// Cuts along the path, from a node or else from the border. Where it ends: a node with the path's
     /// end among the triangles around it, or nowhere.
     fn follow(&mut self, path: &Path, start: Option<u32>) -> Option<u32> {
+        // When the path was last at an edge. The front may be beside the path, at the end of that edge.
+        let mut reached = 0.0;
         let mut front = match start {
             Some(front) => front,
-            None => self.enter(path, 0.0, None)?,
+            None => self.enter(path, &mut reached, None)?,
         };
-        // A cut that goes on does so from where the blade was, not from the last edge it crossed.
-        let mut from = if start.is_some() { path.from } else { self.position(front) };
         // No path crosses an edge twice, and no frame makes many new ones; this is so that it ends
         // whatever the surface looks like.
         for _ in 0..4 * self.triangles.len() {
-            let here = self.position(front);
-            let next = self.next(path, front, from).or_else(|| self.next(path, front, here));
-            if let Some(Crossing { ends, share, .. }) = next {
+            let next = self.next(path, front, reached).or_else(|| self.next_from_here(path, front));
+            if let Some(Crossing { ends, share, time }) = next {
                 let node = self.node_on(ends, share);
                 self.slit([front, node]);
-                front = node;
+                (front, reached) = (node, time.max(reached));
             } else if self.ends_around(path, front) {
                 return Some(front);
             } else {
-                front = self.enter(path, path.time(here), Some(front))?;
+                front = self.enter(path, &mut reached, Some(front))?;
             }
-            from = self.position(front);
         }
         Some(front)
     }
 
-    /// Where the path, seen from a point in the fan of a node, leaves that fan.
-    fn next(&self, path: &Path, front: u32, from: DVec3) -> Option<Crossing> {
-        let sides = self.fan(front).map(|triangle| self.opposite(triangle, front));
-        let way = path.to - from;
-        let ahead = |crossing: &Crossing| {
-            let point = self.point(crossing);
-            let along = (point - from).dot(way);
-            along > 0.0 && along <= way.length_squared() && path.reaches(point, crossing.time)
-        };
-        self.first(path, from, sides, ahead)
+    /// The sides opposite a node of the triangles around it.
+    fn sides_around(&self, node: u32) -> impl Iterator<Item = [u32; 2]> + '_ {
+        self.fan(node).map(move |triangle| self.opposite(triangle, node))
     }
 
-    /// Where the path comes to the border after a time: the node there.
-    fn enter(&mut self, path: &Path, after: f64, not_at: Option<u32>) -> Option<u32> {
+    /// Where the path leaves the fan of a node that it came to at a time.
+    fn next(&self, path: &Path, front: u32, reached: f64) -> Option<Crossing> {
+        let ahead = |crossing: &Crossing| {
+            crossing.time > reached
+                && crossing.time <= 1.0
+                && path.reaches(self.point(crossing), crossing.time)
+        };
+        self.first(path, path.from, self.sides_around(front), ahead)
+    }
+
+    /// Where the straight way from a node to the path's end leaves the node's fan: for a front that the
+    /// path has lost, when tissue has moved.
+    fn next_from_here(&self, path: &Path, front: u32) -> Option<Crossing> {
+        let here = self.position(front);
+        let way = path.to - here;
+        let ahead = |crossing: &Crossing| {
+            let point = self.point(crossing);
+            let along = (point - here).dot(way);
+            along > 0.0 && along <= way.length_squared() && path.reaches(point, crossing.time)
+        };
+        self.first(path, here, self.sides_around(front), ahead)
+    }
+
+    /// Where the path comes to the border after a time, which becomes that of coming there: the node
+    /// there.
+    fn enter(&mut self, path: &Path, reached: &mut f64, not_at: Option<u32>) -> Option<u32> {
         let sides = self.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
         let sides = sides.filter(|ends| not_at.is_none_or(|node| !ends.contains(&node)));
-        let earliest = (after - BEHIND / (path.to - path.from).length()).max(0.0);
+        let earliest = (*reached - BEHIND / (path.to - path.from).length()).max(0.0);
         let ahead = |crossing: &Crossing| {
             (earliest..=1.0).contains(&crossing.time)
                 && path.reaches(self.point(crossing), crossing.time)
                 && self.count(crossing.ends) == 1
         };
-        let Crossing { ends, share, .. } = self.first(path, path.from, sides, ahead)?;
+        let Crossing { ends, share, time } = self.first(path, path.from, sides, ahead)?;
+        *reached = reached.max(time);
         Some(self.node_on(ends, share))
     }
 
@@ -132,8 +148,7 @@ impl CutSurface {
                 continue;
             }
             let mut crossing = Crossing { ends, share: p / (p - q), time: 0.0 };
-            let point = self.point(&crossing);
-            crossing.time = path.time(point);
+            crossing.time = path.time(self.point(&crossing));
             let earlier = first.as_ref().is_none_or(|first| crossing.time < first.time);
             if earlier && will_do(&crossing) {
                 first = Some(crossing);
@@ -152,8 +167,8 @@ impl CutSurface {
     fn ends_around(&self, path: &Path, front: u32) -> bool {
         let here = self.position(front);
         let way = path.to - here;
-        let sides = self.fan(front).map(|triangle| self.opposite(triangle, front));
         let ahead = |crossing: &Crossing| (self.point(crossing) - here).dot(way) > 0.0;
+        let sides = self.sides_around(front);
         way.length() <= LEAST_WAY || self.first(path, here, sides, ahead).is_some()
     }
 }
