@@ -18,8 +18,8 @@ use crate::object::{Object, ObjectId};
 const EDGE: f32 = 0.02;
 /// How far from an elevator's tip it scrapes, in metres; usually 0.006.
 const SCRAPED: f32 = 0.006;
-/// How far from the tip forceps and hooks take hold, in metres; usually 0.006.
-const REACH: f32 = 0.006;
+/// How far from the tip forceps and hooks take hold, in metres; usually 0.008.
+const REACH: f32 = 0.008;
 /// The stiffness with which a node of tissue is held, in newtons per metre; usually 500.
 const HOLD: f32 = 500.0;
 /// The greatest force on a node that forceps hold, in newtons; usually 2.

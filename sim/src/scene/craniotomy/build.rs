@@ -7,13 +7,14 @@ use super::{
     FIRST_GROUP, FIRST_STRUCTURE, PIECES, SKULL, SKULL_GROUP, TIME_STEP, TOOL_GROUP, TOOLS,
 };
 use crate::behavior::tissue::{Material, Pin, Tissue, TissueError};
-use crate::behavior::{Bone, Instrument, Tool, Workpieces};
+use crate::behavior::{Behavior, Bone, Instrument, Tool, Workpieces};
 use crate::device::DeviceSample;
 use crate::geometry::Geometry;
 use crate::interaction::{
     Attached, BurrForce, BurrInBone, Compliant, CompliantError, Detection, InteractionPair, Link,
     NodesInBone, NodesInShape, PieceInBone, PieceOnBone, Response, RuleError, Rules,
 };
+use crate::message::Message;
 use crate::object::{Drawing, Group, Object, ObjectId, VisualProperties};
 use crate::scene::Scene;
 use crate::scene::head::{Form, Head, Hold, Layer, Structure};
@@ -26,14 +27,16 @@ const SUBSTEPS: u32 = 16;
 const BENDING: f32 = 0.05;
 /// How fast tissue comes to rest, per second; usually 8: it lies in tissue.
 const DAMPING: f32 = 8.0;
-/// How much shorter scalp would be if it were free, as a share; usually 0.04: skin is under tension, and
+/// How much shorter scalp would be if it were free, as a share; usually 0.06: skin is under tension, and
 /// an incision gapes.
-const TENSION: f32 = 0.04;
+const TENSION: f32 = 0.06;
 /// Of a node that has grown onto what does not move: newtons per metre, and the force at which it tears, in
 /// newtons.
 const FIRM: [f32; 2] = [1_000.0, f32::INFINITY];
 /// Of a node that lies on it; likewise.
 const LOOSE: [f32; 2] = [100.0, 0.25];
+/// Of a node of scalp over the loose tissue that lets it glide on the skull; likewise.
+const GLIDING: [f32; 2] = [3.0, 0.05];
 /// How much longer loose links hold, in metres; usually 4 mm.
 const LOOSE_STRETCH: f32 = 0.004;
 /// The stiffness below which a link is of loose tissue, in newtons per metre.
@@ -142,13 +145,17 @@ fn soft(number: usize, structure: &Structure) -> Result<Object, BuildError> {
         mesh.positions.set(node, place);
     }
     let pins = structure.pins.iter().map(|&(node, hold)| {
-        let [stiffness, strength] = match hold {
-            Hold::Firm => FIRM,
-            Hold::Loose => LOOSE,
+        let [stiffness, strength] = match (hold, structure.layer) {
+            (Hold::Firm, _) => FIRM,
+            (Hold::Loose, Layer::Scalp) => GLIDING,
+            (Hold::Loose, _) => LOOSE,
         };
         Pin { node, point: positions[node as usize], stiffness, strength }
     });
-    let tissue = tissue.with_pins(pins.collect()).map_err(refused)?;
+    let mut tissue = tissue.with_pins(pins.collect()).map_err(refused)?;
+    // Scalp is held up by what it lies on. The brain floats in its fluid, and with all else the image
+    // shows the form that it has under its own weight.
+    tissue.process(&Message::Weightless(structure.layer != Layer::Scalp));
     let (id, group) = (structure_id(number), structure_group(number));
     let mut object = Object::new(id, group, Geometry::Mesh(mesh), tissue);
     object.visual = VisualProperties { color: structure.color };

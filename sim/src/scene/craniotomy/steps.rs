@@ -23,8 +23,8 @@ const DRAWING: f32 = 0.02;
 const SCRAPING: f32 = 0.05;
 /// How far from the incision the flap is scraped off, in metres; usually 30 mm.
 const SCRAPED: f32 = 0.03;
-/// How far beyond the plan's bite tissue is held, in metres; usually 4 mm.
-const FARTHER: f32 = 0.004;
+/// How far beyond the plan's bite tissue is held, in metres; usually 7 mm.
+const FARTHER: f32 = 0.007;
 /// How fast a craniotome is led, in metres per second; usually 0.003.
 const SAWING: f32 = 0.003;
 /// How far beyond the inner table a craniotome's tip is led, in metres; usually 2 mm.
@@ -138,6 +138,9 @@ fn retract(script: &mut Script, head: &Head) {
         Pull { from, ..*pull }
     };
     let (flap, margin) = (bite(flap), bite(margin));
+    // The hook holds the flap while the elevator frees it: it would glide away.
+    take(script, LEFT, Instrument::Hook, &flap);
+    script.meet();
     let towards_base = (flap.to - flap.from).normalize_or_zero();
     let lines = plan.incision.chunks(3).filter_map(|chunk| chunk.first());
     for (number, &from) in lines.enumerate() {
@@ -147,27 +150,31 @@ fn retract(script: &mut Script, head: &Head) {
         if number % 2 == 1 {
             path.reverse();
         }
-        let instrument = Instrument::Elevator;
-        let axis = -plan.middle.inward;
+        let (instrument, axis) = (Instrument::Elevator, -plan.middle.inward);
         script.stroke(RIGHT, &Stroke { instrument, axis, path, speed: SCRAPING, pressed: true });
     }
-    for (hand, instrument, pull) in
-        [(LEFT, Instrument::Hook, &flap), (RIGHT, Instrument::Forceps, &margin)]
-    {
-        let axis = pull.from.normalize_or(Vec3::Y);
-        script.stroke(hand, &free(instrument, axis, vec![pull.from + axis * AWAY, pull.from]));
-    }
+    take(script, RIGHT, Instrument::Forceps, &margin);
     script.meet();
-    for (hand, instrument, pull) in
-        [(LEFT, Instrument::Hook, &flap), (RIGHT, Instrument::Forceps, &margin)]
-    {
-        let axis = pull.from.normalize_or(Vec3::Y);
-        let path = vec![pull.from, pull.to];
-        script.stroke(hand, &Stroke { instrument, axis, path, speed: DRAWING, pressed: true });
-    }
+    draw(script, LEFT, Instrument::Hook, &flap);
+    draw(script, RIGHT, Instrument::Forceps, &margin);
     script.meet();
     script.wait(RIGHT, 30);
     script.meet();
+}
+
+/// Takes hold of tissue.
+fn take(script: &mut Script, hand: usize, instrument: Instrument, pull: &Pull) {
+    let axis = pull.from.normalize_or(Vec3::Y);
+    script.stroke(hand, &free(instrument, axis, vec![pull.from + axis * AWAY, pull.from]));
+    let path = vec![pull.from];
+    script.stroke(hand, &Stroke { instrument, axis, path, speed: DRAWING, pressed: true });
+}
+
+/// Draws aside what is held.
+fn draw(script: &mut Script, hand: usize, instrument: Instrument, pull: &Pull) {
+    let axis = pull.from.normalize_or(Vec3::Y);
+    let path = vec![pull.from, pull.to];
+    script.stroke(hand, &Stroke { instrument, axis, path, speed: DRAWING, pressed: true });
 }
 
 fn drill(script: &mut Script, entry: &Entry) {
