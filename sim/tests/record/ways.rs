@@ -43,13 +43,11 @@ fn a_session_replays_in_every_way() {
         assert!(totals.letters > 50 && totals.controls > 0, "{totals:?}");
         // Before frames 0, 60, 120 and 180, and at the end.
         assert_eq!((totals.frames, totals.additions, totals.checkpoints), (FRAMES, 1, 5));
-        for &way in &ways {
-            for most in [1, 13, u64::MAX] {
-                let played = replay(&session.file, way, most).expect("a header");
-                assert!(played.error.is_none(), "{seed}, {way:?}: {}", played.error.unwrap());
-                assert_eq!((played.frames, played.checkpoints), (FRAMES, 5), "{seed}, {way:?}");
-                assert_eq!(played.hash, session.last(), "{seed}, {way:?}, by {most}");
-            }
+        for (&way, most) in ways.iter().zip([1, 13, u64::MAX, 60].into_iter().cycle()) {
+            let played = replay(&session.file, way, most).expect("a header");
+            assert!(played.error.is_none(), "{seed}, {way:?}: {:?}", played.error);
+            assert_eq!((played.frames, played.checkpoints), (FRAMES, 5), "{seed}, {way:?}");
+            assert_eq!(played.hash, session.last(), "{seed}, {way:?}, by {most}");
         }
     }
 }
