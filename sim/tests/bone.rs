@@ -195,7 +195,6 @@ fn session(settings: Settings) -> ([u64; 3], Vec3) {
 fn two_drills_free_a_disc_with_the_same_bits_however_it_is_run() {
     let settings = |executor, threads| Settings { executor, threads, ..Settings::default() };
     let expected = session(settings(ExecutorKind::Serial, 1));
-    println!("lifted by {}", expected.1);
     assert!((0.02..0.035).contains(&expected.1.z), "lifted by {}", expected.1);
     for &executor in ExecutorKind::ALL {
         for threads in [1, 2, 3] {

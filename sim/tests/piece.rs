@@ -5,6 +5,7 @@ mod common;
 use std::any::Any;
 
 use common::{no_rules, run, serial};
+use dualframe_sim::behavior::drill::{Bit, Burr, Erode};
 use dualframe_sim::behavior::piece::{BONE_DENSITY, Grasp, Hold, LetGo, Piece};
 use dualframe_sim::behavior::{Bone, Fixed};
 use dualframe_sim::executor::{Executor, SerialExecutor};
@@ -154,7 +155,6 @@ fn rests_on_bone() {
             run(&mut executor, 1);
             deepest = deepest.min(lowest(&executor));
         }
-        println!("deepest {deepest} m, now {} m", lowest(&executor));
         assert!(deepest > -5e-4, "{deepest} m: it sinks in by a voxel at most");
         let (before, low) = (center(&executor), lowest(&executor));
         assert!(low.abs() < 1.5e-4, "{low} m over the bone");
@@ -262,4 +262,30 @@ fn scenery_and_bone_ignore_hands() {
     }
     run(&mut executor, 3);
     assert!(look(&executor, |piece, _| piece.holders().next().is_none()));
+}
+
+#[test]
+fn is_drilled_like_any_bone() {
+    let pose = Pose::from_parts(Vec3::new(0.1, 0.2, 0.3), turned());
+    let mut executor = scene(flap(pose), false, vec![floor()], 9.81);
+    let weight = |executor: &SerialExecutor| {
+        look(executor, |piece, volume| {
+            let densities: u64 = volume.densities().map(u64::from).sum();
+            (piece.removed(), densities, piece.body().mass)
+        })
+    };
+    let (center, (_, whole, mass)) = (center(&executor), weight(&executor));
+    let burr = Burr { bit: Bit::BURR, center, axis: Vec3::Z, spin: 3e3, side: None };
+    for _ in 0..20 {
+        // What is scenery, or no bone at all, ignores it.
+        for id in [0, 5] {
+            let erode = Erode { burr, load: 10.0 };
+            executor.mailbox().post(ObjectId(id), Message::Custom(Box::new(erode)));
+        }
+        run(&mut executor, 1);
+    }
+    let (removed, left, lighter) = weight(&executor);
+    assert!(removed > 10_000 && removed + left == whole, "{removed} of {whole}");
+    let expected = mass * left as f32 / whole as f32;
+    assert!((lighter / expected - 1.0).abs() < 1e-4, "{lighter} kg, not {expected}");
 }

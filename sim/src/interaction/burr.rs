@@ -74,3 +74,94 @@ impl Response for BurrForce {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use parry3d::math::Pose;
+    use parry3d::shape::SharedShape;
+
+    use super::*;
+    use crate::behavior::drill::{Bit, Burr};
+    use crate::behavior::{Behavior, Bone, Fixed, Input};
+    use crate::geometry::{Geometry, Rigid, Volume};
+    use crate::object::{Group, ObjectId};
+
+    const TIME: f32 = 1.0 / 60.0;
+
+    struct Tool(Burr);
+
+    impl Behavior for Tool {
+        fn update(&mut self, _geometry: &mut Geometry, _input: &mut Input<'_>) {}
+
+        fn burr(&self, _geometry: &Geometry) -> Option<Burr> {
+            Some(self.0)
+        }
+    }
+
+    fn shape() -> Geometry {
+        Geometry::Rigid(Rigid::new(SharedShape::ball(3e-3), Pose::IDENTITY))
+    }
+
+    fn bone() -> Object {
+        let full = |voxel: [u32; 3]| if voxel[2] < 20 { 255 } else { 0 };
+        let volume = Volume::from_fn([40; 3], Vec3::splat(5e-4), Pose::IDENTITY, full);
+        let volume = Geometry::Volume(volume.expect("it is small"));
+        Object::new(ObjectId(1), Group(1), volume, Bone::new())
+    }
+
+    /// What a bit 1 mm deep in flat bone does to the tool and to the bone.
+    fn respond(tool: Object) -> [Impulses; 2] {
+        let (bone, mut touches) = (bone(), Touches::default());
+        BurrInBone.detect(&tool, &bone, &mut touches);
+        let mut impulses: [Impulses; 2] = Default::default();
+        let [first, second] = &mut impulses;
+        BurrForce.respond([&tool, &bone], &touches, TIME, [first, second]);
+        impulses
+    }
+
+    fn tool(bit: Bit, axis: Vec3, spin: f32) -> Object {
+        let center = Vec3::new(0.01, 0.01, 0.01 + bit.radius - 1e-3);
+        let burr = Burr { bit, center, axis, spin, side: None };
+        Object::new(ObjectId(0), Group(0), shape(), Tool(burr))
+    }
+
+    fn reaction(impulses: &mut Impulses) -> Reaction {
+        Reaction::new(impulses.segment(ObjectId(0), ObjectId(1)).iter(), TIME)
+    }
+
+    #[test]
+    fn tool_and_bone_push_each_other_and_the_tool_is_told_more() {
+        let [mut on_tool, mut on_bone] = respond(tool(Bit::BURR, Vec3::X, 3e3));
+        let felt = reaction(&mut on_tool);
+        let expected = Bit::BURR.elastic_force(1e-3);
+        assert!((felt.load() / expected - 1.0).abs() < 0.1, "{felt:?}");
+        assert!(felt.normal().expect("it touches").z > 0.999);
+        // The lowest point of a bit that turns about +x moves to +y, and is dragged back.
+        let drag = felt.force - felt.elastic;
+        assert!((drag.y + FRICTION * felt.load()).abs() < 1e-3, "{drag}");
+        assert_eq!(felt.tip, 0.0);
+        let back = reaction(&mut on_bone);
+        assert!((back.force + felt.force).length() < 1e-5);
+        assert_eq!(back.elastic, Vec3::ZERO);
+    }
+
+    #[test]
+    fn a_tip_alone_has_no_friction_and_bears_the_load() {
+        let [mut on_tool, _] = respond(tool(Bit::PERFORATOR, Vec3::Z, 105.0));
+        let felt = reaction(&mut on_tool);
+        assert!((felt.force - felt.elastic).length() < 1e-3 * felt.load());
+        let share = felt.tip / felt.load();
+        assert!((0.5..1.0).contains(&share), "{share}");
+    }
+
+    #[test]
+    fn what_does_not_turn_has_no_drag_and_what_is_no_drill_no_contact() {
+        let [mut still, _] = respond(tool(Bit::BURR, Vec3::X, 0.0));
+        let still = reaction(&mut still);
+        assert_eq!(still.force, still.elastic);
+        let other = Object::new(ObjectId(0), Group(0), shape(), Fixed);
+        let [mut none, mut on_bone] = respond(other);
+        assert_eq!(reaction(&mut none), Reaction::default());
+        assert_eq!(reaction(&mut on_bone), Reaction::default());
+    }
+}

@@ -104,7 +104,6 @@ fn a_perforator_stops_where_the_bone_ends() {
                 deepest = deepest.max(depth(&bench));
             }
         }
-        println!("stopped in frame {stopped:?} at {} mm", deepest * 1e3);
         let past = deepest - THICKNESS;
         assert!((0.0..1e-3).contains(&past), "{past} m past the inner table at {x}, {y}");
         assert!(stopped.is_some());
@@ -180,7 +179,6 @@ fn a_burr_goes_deeper_at_the_rate_of_removal() {
     let (depth, volume) = depth_after(255, 120);
     // Between the speeds at the tip and at the rim, and near what the bit's description says.
     let rate = volume / 2.0;
-    println!("{} mm/s, {} mm³/s", depth * 0.5e3, rate * 1e9);
     assert!((30e-9..80e-9).contains(&rate), "{rate} m³/s");
     // A hole of the burr's own width, once it is half in.
     let hole = std::f32::consts::PI * Bit::BURR.radius.powi(2) * depth;
@@ -209,7 +207,6 @@ fn what_is_removed_follows_load_and_time_and_not_the_number_of_calls() {
     assert!(once > 1_500.0, "{once}");
     for calls in [2, 5, 20, 100, 1_000] {
         let share = removed(calls, 10.0, 3_000.0) / once;
-        println!("{calls} calls: {share}");
         assert!((share - 1.0).abs() < 0.03, "{calls} calls: {share}");
     }
     for (load, spin) in [(5.0, 3_000.0), (10.0, -1_500.0)] {

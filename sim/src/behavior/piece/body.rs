@@ -141,6 +141,7 @@ fn turned_on(rotation: Quat, by: Vec3) -> Quat {
 struct Sums {
     whole: u64,
     first: [u64; 3],
+    /// Those of two coordinates in ascending order.
     second: [[u64; 3]; 3],
 }
 
@@ -167,11 +168,9 @@ impl Sums {
         self.whole += whole;
         let first = [x, whole * y, whole * z];
         let second = [[xx, x * y, x * z], [0, whole * y * y, whole * y * z], [0, 0, whole * z * z]];
-        for axis in 0..3 {
-            self.first[axis] += first[axis];
-            for other in axis..3 {
-                self.second[axis][other] += second[axis][other];
-            }
+        let sums = self.first.iter_mut().chain(self.second.as_flattened_mut());
+        for (sum, part) in sums.zip(first.iter().chain(second.as_flattened())) {
+            *sum += part;
         }
     }
 }

@@ -9,7 +9,9 @@ use std::ops::Range;
 use super::Volume;
 
 /// A voxel is solid from this density on, of 255; usually 128: one half, as for the surface.
-pub(super) const SOLID: u8 = 128;
+const SOLID: u8 = 128;
+/// The range of nothing, to be widened.
+pub(super) const NOWHERE: Range<u32> = Range { start: u32::MAX, end: 0 };
 
 /// Solid voxels that hang together by their faces.
 #[derive(Clone, Debug)]
@@ -54,8 +56,7 @@ impl Part {
 
     /// A part of nothing yet.
     fn new() -> Self {
-        let bounds = std::array::from_fn(|_| u32::MAX..0);
-        Self { voxels: 0, bounds, touches_border: false, runs: Vec::new() }
+        Self { voxels: 0, bounds: [NOWHERE; 3], touches_border: false, runs: Vec::new() }
     }
 
     fn push(&mut self, run: Run, within: &[Range<u32>; 3]) {

@@ -176,7 +176,8 @@ fn the_same_parts_as_a_flood() {
 fn a_large_box() {
     let volume = build([200, 200, 100], |[x, y, z]| {
         let aside = (i64::from(x) - 100).pow(2) + (i64::from(y) - 100).pow(2);
-        let pore = mix(u64::from(x / 4) << 40 | u64::from(y / 4) << 20 | u64::from(z / 4)) % 3 == 0;
+        let cell = mix(u64::from(x / 4) << 40 | u64::from(y / 4) << 20 | u64::from(z / 4));
+        let pore = cell.is_multiple_of(3);
         match (aside - 60 * 60).abs() < 200 || !(20..70).contains(&z) {
             true => 0,
             false if pore && (30..60).contains(&z) => 60,

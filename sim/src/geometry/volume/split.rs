@@ -6,7 +6,7 @@ use glam::Vec3;
 use parry3d::math::Pose;
 
 use super::bricks::{Bricks, Layout};
-use super::parts::Part;
+use super::parts::{NOWHERE, Part};
 use super::{Volume, VolumeError};
 
 /// How far around a part's box, in voxels, its rim and what else claims it are looked for; usually 16: more
@@ -154,7 +154,7 @@ impl Claim {
     /// The box around what is the part's.
     fn bounds(&self) -> [Range<u32>; 3] {
         let [_, wide, flat] = self.strides();
-        let mut bounds = std::array::from_fn(|_| u32::MAX..0);
+        let mut bounds = [NOWHERE; 3];
         let cells = self.owned.iter().map(|&cell| cell as usize);
         for cell in cells.filter(|&cell| self.owners[cell] == Owner::Part) {
             let place = [cell % wide, cell % flat / wide, cell / flat];
