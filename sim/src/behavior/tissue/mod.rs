@@ -186,7 +186,8 @@ impl Tissue {
         let triangles = topology.triangles();
         let bending = shape::bending(&self.rest, triangles, &self.slits)?;
         let masses = shape::masses(&self.rest, triangles, self.material.area_density);
-        if let Some(node) = masses.iter().position(|&mass| !(mass > 0.0)) {
+        let is_there = |mass: &f32| *mass > 0.0;
+        if let Some(node) = masses.iter().position(|mass| !is_there(mass)) {
             return Err(TissueError::Massless { node });
         }
         let nodes = topology.nodes();

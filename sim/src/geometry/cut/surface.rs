@@ -98,8 +98,9 @@ impl CutSurface {
         let near = share.min(1.0 - share);
         let both = self.fan(p).filter(|&place| self.triangles[place].contains(&q));
         let around: Vec<u32> = both.flat_map(|place| self.triangles[place]).collect();
-        // Negated so that what is no number makes no node.
-        if !(near >= self.snap([p, q])) || self.is_crowded(&node, &around) {
+        // What is no number makes no node.
+        let is_inside = near >= self.snap([p, q]);
+        if !is_inside || self.is_crowded(&node, &around) {
             return if share < 0.5 { p } else { q };
         }
         self.split_edge([p, q], share as f32, node)
