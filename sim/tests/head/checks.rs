@@ -31,9 +31,9 @@ fn check_structure(structure: &Structure) {
         let area = 0.5 * normal(positions, triangle).length();
         assert!(area > 1e-9, "{name}: a triangle of {area} m²");
     }
-    let lengths = edges(triangles).into_iter().map(|[a, b]| {
-        positions[a as usize].distance(positions[b as usize])
-    });
+    let lengths = edges(triangles)
+        .into_iter()
+        .map(|[a, b]| positions[a as usize].distance(positions[b as usize]));
     let longest = lengths.fold(0.0, f32::max);
     assert!(longest < 0.025, "{name}: an edge of {longest} m");
     assert_eq!(masses.len(), count);
