@@ -32,8 +32,6 @@ mod skull;
 mod structures;
 mod surface;
 mod synthetic;
-#[cfg(test)]
-mod tests;
 
 use std::ops::RangeInclusive;
 

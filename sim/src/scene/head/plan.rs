@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::anatomy::site;
-use super::frame::{FRONT, UP};
+use super::frame::FRONT;
 use super::layers::Layers;
 use super::radial::tangents;
 use super::structures::resampled;
@@ -101,9 +101,7 @@ impl<'a> Chart<'a> {
     fn new(layers: &'a Layers) -> Self {
         let out = site();
         let front = (FRONT - out * FRONT.dot(out)).normalize();
-        let across = out.cross(front);
-        let up = if across.dot(UP) < 0.0 { -across } else { across };
-        Self { layers, front, up }
+        Self { layers, front, up: out.cross(front) }
     }
 
     /// The direction of what is so many metres to the front and upwards on the skull.
@@ -220,6 +218,7 @@ fn outline(chart: &Chart<'_>) -> Vec<Vec3> {
     const PARTS: usize = 16;
     let [long, high, round] = OPENING;
     let [front, up] = OPENING_MIDDLE;
+    // Seen from the right the front lies to the right: over the back and below is counter-clockwise.
     // Corners in turn, each a quarter circle (2t, 1 − t²)/(1 + t²), whose ends the sides join.
     let quarter = (0..=PARTS).map(|part| {
         let t = part as f32 / PARTS as f32;
@@ -247,9 +246,5 @@ fn outline(chart: &Chart<'_>) -> Vec<Vec3> {
     points.extend(points.first().copied());
     let mut points = resampled(&points, OPENING_STEP);
     points.pop();
-    // Seen from outside, the front lies to the right of up or to the left of it, by side.
-    if chart.front.cross(chart.up).dot(site()) < 0.0 {
-        points[1..].reverse();
-    }
     points
 }

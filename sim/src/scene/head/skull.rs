@@ -176,20 +176,19 @@ impl<'a> Bone<'a> {
                 continue;
             }
             let voxel = [number % wide, number / wide % high, number / (wide * high)];
-            let (mut missing, mut all) = (0_u32, 0_u32);
-            for sample in 0..samples.iter().product() {
+            let within = |sample: u32| {
                 let [x, y, _] = samples;
                 let part = [sample % x, sample / x % y, sample / (x * y)];
                 let at = [0, 1, 2].map(|axis| {
                     let share = (f64::from(part[axis]) + 0.5) / f64::from(samples[axis]);
                     voxel[axis] as f64 - 0.5 + share
                 });
-                if let Some(voxel) = self.lattice.voxel(to_world(at)) {
-                    missing += u32::from(gone[self.lattice.number(voxel)]);
-                    all += u32::from(self.density(voxel));
-                }
-            }
+                self.lattice.voxel(to_world(at))
+            };
+            let all = || (0..samples.iter().product()).filter_map(within);
+            let missing: u32 = all().map(|at| u32::from(gone[self.lattice.number(at)])).sum();
             if missing > 0 {
+                let all: u32 = all().map(|at| u32::from(self.density(at))).sum();
                 let left = f64::from(all.saturating_sub(missing)) / f64::from(all.max(1));
                 let above_air = f64::from(*hounsfield) - f64::from(AIR);
                 *hounsfield = (f64::from(AIR) + above_air.max(0.0) * left).round() as i16;

@@ -8,12 +8,12 @@ use crate::mix::mix;
 /// The distance between voxels, in millimetres; usually 1.5.
 const VOXEL: f32 = 1.5;
 /// The voxels from left to right, from the back to the front and from the base to the vertex.
-const DIMS: [u32; 3] = [124, 142, 106];
+const DIMS: [u32; 3] = [124, 142, 112];
 /// The voxel in the middle of the cranium.
-const MIDDLE: [f32; 3] = [61.5, 70.5, 47.5];
+const MIDDLE: [f32; 3] = [61.5, 70.5, 53.5];
 /// Half the cranium's width, length and height above and below its middle, in millimetres; usually
-/// 68, 84, 70 and 56.
-const HALF: [f32; 4] = [68.0, 84.0, 70.0, 56.0];
+/// 68, 84, 70 and 66.
+const HALF: [f32; 4] = [68.0, 84.0, 70.0, 66.0];
 /// The thickness of the skull, in millimetres; usually 5, and 8 at the back.
 const SKULL: [f32; 2] = [5.0, 8.0];
 /// The thickness of the dense tables of the skull, in millimetres; usually 1.6.

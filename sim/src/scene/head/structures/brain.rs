@@ -92,13 +92,14 @@ impl Part {
         cuts.into_iter().fold(f32::MIN, f32::max)
     }
 
-    /// Whether a node has grown together with what is deeper: the brain's inner half, the cerebellum's
+    /// Whether a node has grown together with what is deeper: the brain's inner half, or near it, the cerebellum's
     /// stalks, the brainstem's lower end.
     fn is_held(self, layers: &Layers, scale: Scale, position: Vec3) -> bool {
         let [_, front, up] = parts(position);
         match self {
             Self::Cerebellum => front > -0.038 * scale.0,
             Self::Brainstem => up < -0.042 * scale.0,
+            Self::Occipital => position.length() < 0.7 * layers.inner.at(position),
             _ => position.length() < 0.5 * layers.inner.at(position),
         }
     }

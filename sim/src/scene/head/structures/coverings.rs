@@ -10,8 +10,8 @@ use crate::scene::head::frame::{RIGHT, UP, parts};
 use crate::scene::head::layers::Layers;
 use crate::scene::head::surface::{Surface, extract};
 
-/// How often sheets are relaxed: usually 8 times half of the way.
-const RELAX: (usize, [f32; 1]) = (8, [0.5]);
+/// How sheets are relaxed: 6 times there and back, which evens nodes and keeps the border's corners.
+const RELAX: (usize, [f32; 2]) = (6, [0.5, -0.5]);
 /// How far down sheets on the vault go, in metres from the head's middle; usually 50 mm.
 const FLOOR: f32 = -0.05;
 
@@ -30,11 +30,11 @@ const DURA_PATCHES: [(&str, f32); 3] =
 
 pub(super) fn make(layers: &Layers) -> impl Iterator<Item = Structure> {
     let scalp = SCALP_PATCHES.into_iter().enumerate().map(|(number, (name, spacing))| {
-        patch(layers, &SCALP, name, spacing, &|d| layers.skin.at(d), number, scalp_at)
+        patch(&SCALP, name, spacing, &|d| layers.skin.at(d), number, scalp_at)
     });
     let dura = DURA_PATCHES.into_iter().enumerate().map(|(number, (name, spacing))| {
         let depth = 0.5 * DURA.thickness;
-        patch(layers, &DURA, name, spacing, &|d| layers.inner.at(d) - depth, number, dura_at)
+        patch(&DURA, name, spacing, &|d| layers.inner.at(d) - depth, number, dura_at)
     });
     let muscles = [
         muscle(layers, "right temporalis", 1.0),
@@ -78,11 +78,11 @@ fn sheet(radius: &dyn Fn(Vec3) -> f32, spacing: f32, keep: impl Fn(Vec3) -> bool
     extract(&bounds.inflated(spacing), spacing, field)
         .sheet(|point| parts(point)[2] > FLOOR && keep(point.normalize()))
         .relaxed(rounds, &shares, |point| point.normalize() * radius(point))
+        .upright(|point| point)
 }
 
 /// A patch of scalp or dura: loose on the bone, and grown on where it ends and no other patch begins.
 fn patch(
-    _: &Layers,
     tissue: &Tissue,
     name: &'static str,
     spacing: f32,
@@ -140,7 +140,7 @@ fn falx(layers: &Layers) -> Structure {
     };
     let (rounds, shares) = RELAX;
     let flat = |point: Vec3| point - RIGHT * parts(point)[0];
-    let surface = surface.sheet(keep).relaxed(rounds, &shares, flat);
+    let surface = surface.sheet(keep).relaxed(rounds, &shares, flat).upright(|_| RIGHT);
     DURA.structure("falx", surface, held_at_the_wall(layers))
 }
 
@@ -162,7 +162,8 @@ fn tentorium_sheet(layers: &Layers) -> Structure {
             && !notch
     };
     let (rounds, shares) = RELAX;
-    let surface = surface.sheet(keep).relaxed(rounds, &shares, |p| p - UP * height(p));
+    let surface =
+        surface.sheet(keep).relaxed(rounds, &shares, |p| p - UP * height(p)).upright(|_| UP);
     DURA.structure("tentorium", surface, held_at_the_wall(layers))
 }
 

@@ -6,6 +6,9 @@ use glam::Vec3;
 
 use super::{Surface, sides};
 
+/// The least area of a sheet's triangle, in square metres; usually 0.2 mm².
+const LEAST_AREA: f32 = 2e-7;
+
 impl Surface {
     /// The sheet of the triangles whose middles `keep` says are in it: the largest part of them, without
     /// triangles that hang on by one side only and without corners where it is pinched.
@@ -15,6 +18,25 @@ impl Surface {
             let [a, b, c] = triangle.map(|node| positions[node as usize]);
             keep((a + b + c) / 3.0)
         });
+        self.cleaned()
+    }
+
+    /// The sheet without triangles that do not face the way that `out` says of a place, or hardly have an
+    /// area: relaxing may fold the border's.
+    pub(in crate::scene::head) fn upright(mut self, out: impl Fn(Vec3) -> Vec3) -> Self {
+        let normals: Vec<Vec3> = self.triangles.iter().map(|&t| self.normal(t)).collect();
+        let positions = &self.positions;
+        let mut normals = normals.into_iter();
+        self.triangles.retain(|triangle| {
+            let normal = normals.next().unwrap_or_default();
+            let along = normal.dot(out(positions[triangle[0] as usize]).normalize_or_zero());
+            along > 0.3 * normal.length() && normal.length() > 2.0 * LEAST_AREA
+        });
+        self.cleaned()
+    }
+
+    /// The largest part, without ears and pinches.
+    fn cleaned(mut self) -> Self {
         loop {
             let before = self.triangles.len();
             self = self.largest_part().without_ears().without_pinches();

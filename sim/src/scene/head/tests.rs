@@ -1,1 +1,0 @@
-//! The synthetic head, as a whole.
