@@ -232,7 +232,8 @@ mod tests {
     #[test]
     fn a_compound_is_its_parts() {
         let ball = SharedShape::ball(1.0);
-        let parts = [Vec3::ZERO, Vec3::X * 3.0].map(|at| (Pose::from_translation(at), ball.clone()));
+        let parts =
+            [Vec3::ZERO, Vec3::X * 3.0].map(|at| (Pose::from_translation(at), ball.clone()));
         let (nodes, triangles) = outline(&SharedShape::compound(parts.to_vec())).expect("bounded");
         let (one, of_one) = outline(&ball).expect("bounded");
         assert_eq!((nodes.len(), triangles.len()), (2 * one.len(), 2 * of_one.len()));

@@ -60,9 +60,8 @@ pub(super) fn attachments(structures: &[Structure]) -> Vec<Attachment> {
     for (b, second) in structures.iter().enumerate() {
         for (a, first) in structures[..b].iter().enumerate() {
             let kin = KINSHIPS.iter().chain(&BRAIN).find(|Kinship(one, two, ..)| {
-                let fits = |one: &str, two: &str| {
-                    first.name.contains(one) && second.name.contains(two)
-                };
+                let fits =
+                    |one: &str, two: &str| first.name.contains(one) && second.name.contains(two);
                 fits(one, two) || fits(two, one)
             });
             let Some(&Kinship(.., reach, stiffness)) = kin else { continue };

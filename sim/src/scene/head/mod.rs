@@ -166,15 +166,14 @@ impl Head {
         }
         let grid = self.image.grid();
         let frame = Frame::new(grid, self.center);
-        let field =
-            Field { voxels: &self.densities, dims: grid.dims(), frame, outside: 0 };
+        let field = Field { voxels: &self.densities, dims: grid.dims(), frame, outside: 0 };
         let affine = grid.affine();
-        let to_world = |voxel: [f64; 3]| {
-            Frame::in_world(self.center, affine.transform_point3(voxel.into()))
-        };
-        let samples = grid.spacing().to_array().map(|spacing| {
-            (spacing / f64::from(skull::SPACING)).ceil().max(1.0) as u32
-        });
+        let to_world =
+            |voxel: [f64; 3]| Frame::in_world(self.center, affine.transform_point3(voxel.into()));
+        let samples = grid
+            .spacing()
+            .to_array()
+            .map(|spacing| (spacing / f64::from(skull::SPACING)).ceil().max(1.0) as u32);
         let mut voxels = self.image.voxels().to_vec();
         Bone::new(self.lattice, field).carve(&mut voxels, skull, also, to_world, samples);
         Ok(Image::new(grid.clone(), voxels)?)

@@ -229,8 +229,12 @@ fn outline(chart: &Chart<'_>) -> Vec<Vec3> {
     let quarter: Vec<[f32; 2]> = quarter.collect();
     let [inner_long, inner_high] = [long - round, high - round];
     // From up to the back, to below, to the front.
-    let turns: [[f32; 4]; 4] =
-        [[-1.0, 0.0, 0.0, 1.0], [0.0, -1.0, -1.0, 0.0], [1.0, 0.0, 0.0, -1.0], [0.0, 1.0, 1.0, 0.0]];
+    let turns: [[f32; 4]; 4] = [
+        [-1.0, 0.0, 0.0, 1.0],
+        [0.0, -1.0, -1.0, 0.0],
+        [1.0, 0.0, 0.0, -1.0],
+        [0.0, 1.0, 1.0, 0.0],
+    ];
     let corners = [[-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [1.0, 1.0]];
     let mut points = Vec::new();
     for ([a, b, c, d], [x, y]) in turns.into_iter().zip(corners) {

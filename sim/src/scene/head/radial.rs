@@ -128,9 +128,7 @@ fn on_cube(direction: Vec3) -> (usize, [f32; 2]) {
         2
     };
     let face = 2 * axis + usize::from(direction[axis] < 0.0);
-    let at = |other: usize| {
-        (direction[other % 3] / length[axis] + 1.0) * (0.5 * CELLS as f32)
-    };
+    let at = |other: usize| (direction[other % 3] / length[axis] + 1.0) * (0.5 * CELLS as f32);
     (face, [at(axis + 1), at(axis + 2)])
 }
 

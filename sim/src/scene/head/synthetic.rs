@@ -36,7 +36,8 @@ const FLUID: f32 = 3.0;
 pub fn synthetic_ct() -> Result<Image, ImageError> {
     let spacing = f64::from(VOXEL) * 1e-3;
     let origin = DVec3::from(MIDDLE.map(|index| -f64::from(index) * spacing));
-    let affine = DAffine3::from_mat3_translation(DMat3::from_diagonal(DVec3::splat(spacing)), origin);
+    let affine =
+        DAffine3::from_mat3_translation(DMat3::from_diagonal(DVec3::splat(spacing)), origin);
     let grid = Grid::new(DIMS, affine)?;
     let [wide, high, deep] = DIMS;
     let mut voxels = Vec::with_capacity(grid.voxels());

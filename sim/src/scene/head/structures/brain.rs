@@ -73,9 +73,7 @@ impl Part {
         let above_tentorium = tentorium(scale, right, front) + 4.0 * GAP - up;
         let cuts = match self {
             Self::Frontal => [hemisphere, GAP - lateral, GAP - central],
-            Self::Parietal => {
-                [hemisphere, (GAP - lateral).max(central + GAP), GAP - occipital]
-            }
+            Self::Parietal => [hemisphere, (GAP - lateral).max(central + GAP), GAP - occipital],
             Self::Temporal => [
                 (scaled(0.015) + GAP - side * right).max(lateral + GAP),
                 GAP - occipital,

@@ -112,9 +112,8 @@ fn muscle(layers: &Layers, name: &'static str, side: f32) -> Structure {
 
 fn periosteum(layers: &Layers) -> Structure {
     let radius = |d: Vec3| layers.outer.at(d) + 0.5 * PERIOSTEUM.thickness;
-    let surface = sheet(&radius, 0.007, |direction| {
-        direction.dot(site()) > 0.72 && !temple(direction, 1.0)
-    });
+    let surface =
+        sheet(&radius, 0.007, |direction| direction.dot(site()) > 0.72 && !temple(direction, 1.0));
     PERIOSTEUM.structure("right periosteum", surface, |_, _, border| {
         Some(if border { Hold::Firm } else { Hold::Loose })
     })

@@ -105,9 +105,7 @@ impl Tissue {
         let areas = surface.node_areas();
         let area = areas.iter().sum::<f32>().max(f32::MIN_POSITIVE);
         let (area_density, stiffness) = match self.form {
-            Form::Sheet => {
-                (self.density * self.thickness, LATTICE * self.modulus * self.thickness)
-            }
+            Form::Sheet => (self.density * self.thickness, LATTICE * self.modulus * self.thickness),
             Form::Solid => {
                 (self.density * surface.volume() / area, self.modulus * mean_edge(&surface))
             }

@@ -21,7 +21,8 @@ pub(super) fn fill(values: &mut [f32], dims: [usize; 3], spacing: f32) {
                 ((z + dz) * high + y + dy) * wide + x + dx
             };
             loop {
-                let negative = |bits: u8, at: usize| bits | u8::from(values[corner(at)] < 0.0) << at;
+                let negative =
+                    |bits: u8, at: usize| bits | u8::from(values[corner(at)] < 0.0) << at;
                 if !ambiguous[usize::from((0..8).fold(0, negative))] {
                     break;
                 }

@@ -28,7 +28,8 @@ impl Surface {
     fn without_ears(mut self) -> Self {
         let border = self.border();
         self.triangles.retain(|&triangle| {
-            let open = sides(triangle).into_iter().filter(|side| border.binary_search(side).is_ok());
+            let open =
+                sides(triangle).into_iter().filter(|side| border.binary_search(side).is_ok());
             open.count() < 2
         });
         self
