@@ -11,6 +11,7 @@ use dualframe_sim::experiment::plan::Plan;
 use dualframe_sim::manager::Settings;
 use dualframe_sim::pool::cores;
 use dualframe_sim::scene::ParticleScene;
+use dualframe_sim::scene::craniotomy::Step;
 use dualframe_sim::simd::{Instructions, Simd};
 
 /// The most frames of one run: each takes 24 bytes of the report.
@@ -36,6 +37,8 @@ struct Cli {
 enum Command {
     /// Deformable particles in a room of six walls (the default).
     Particles(Particles),
+    /// A craniotomy: two tools, 27 soft structures and the skull.
+    Craniotomy(CraniotomyArgs),
     /// A recorded session once more, checked bit for bit.
     Replay(ReplayArgs),
     /// The paper's experiments on this machine: tables (CSV), figures (SVG, PNG) and a page.
@@ -119,9 +122,9 @@ pub(super) struct Way {
           value_parser = parse_executor,
           help = format!("What drives the stages: {}", executor_names()))]
     pub(super) executor: ExecutorKind,
-    /// Blocks of close objects, or every modelled pair.
-    #[arg(long, value_name = "KIND", value_enum, default_value_t = BroadPhaseName::Spatial)]
-    broad_phase: BroadPhaseName,
+    /// Blocks of close objects, or every modelled pair; the scene's own if not given.
+    #[arg(long, value_name = "KIND", value_enum)]
+    broad_phase: Option<BroadPhaseName>,
     /// Frames that the pipeline works on at once, 1 or 2.
     #[arg(long, value_name = "N", default_value_t = 2,
           value_parser = clap::value_parser!(u8).range(1..=2))]
@@ -133,10 +136,11 @@ pub(super) struct Way {
 }
 
 impl Way {
-    fn grain(&self) -> Grain {
+    fn grain(&self, usual: Grain) -> Grain {
         match self.broad_phase {
-            BroadPhaseName::Spatial => Grain::Spatial,
-            BroadPhaseName::Pairwise => Grain::Pairwise,
+            Some(BroadPhaseName::Spatial) => Grain::Spatial,
+            Some(BroadPhaseName::Pairwise) => Grain::Pairwise,
+            None => usual,
         }
     }
 
@@ -148,9 +152,11 @@ impl Way {
         self.simd.unwrap_or_else(Simd::detect)
     }
 
-    pub(super) fn settings(&self) -> Settings {
+    /// `usual` is the scene's own broad phase.
+    pub(super) fn settings(&self, usual: Grain) -> Settings {
         let Self { executor, threads, .. } = *self;
-        Settings { executor, threads, pinned: false, grain: self.grain(), entry: self.entry() }
+        let (grain, entry) = (self.grain(usual), self.entry());
+        Settings { executor, threads, pinned: false, grain, entry }
     }
 }
 
@@ -192,11 +198,18 @@ pub(super) struct Particles {
     #[command(flatten)]
     pub(super) way: Way,
     /// Show a window, which is what happens where there is a display
-    #[arg(long, conflicts_with_all = ["headless", "offscreen"])]
+    #[arg(long, conflicts_with_all = ["headless", "offscreen", "frames_out"])]
     pub(super) window: bool,
     /// Run without a window
     #[arg(long, conflicts_with = "offscreen")]
     headless: bool,
+    #[command(flatten)]
+    pub(super) products: Products,
+}
+
+/// What a run draws and writes.
+#[derive(Args)]
+pub(super) struct Products {
     /// Draw every frame without a window
     #[arg(long)]
     pub(super) offscreen: bool,
@@ -204,7 +217,7 @@ pub(super) struct Particles {
     #[arg(long, value_name = "FILE.png")]
     pub(super) picture: Option<PathBuf>,
     /// Write a picture of every frame into a folder, which is made if it is not there
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["window", "headless"])]
+    #[arg(long, value_name = "DIR", conflicts_with = "headless")]
     pub(super) frames_out: Option<PathBuf>,
     /// Width and height of window and pictures, in pixels
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
@@ -223,6 +236,36 @@ pub(super) struct Particles {
     pub(super) json: Option<PathBuf>,
 }
 
+/// Arguments of the craniotomy.
+#[derive(Args)]
+pub(super) struct CraniotomyArgs {
+    /// How far the operation goes
+    #[arg(long, value_name = "STEP", default_value = Step::All.name(), value_parser = parse_step,
+          help = format!("How far the operation goes: {}", Step::ALL.map(Step::name).join(", ")))]
+    pub(super) step: Step,
+    /// The patient's computed tomography, NIfTI or NRRD; a synthetic head if not given
+    #[arg(long, value_name = "FILE")]
+    pub(super) ct: Option<PathBuf>,
+    /// Write the computed tomography as it is after the operation, as NIfTI
+    #[arg(long, value_name = "FILE.nii.gz")]
+    pub(super) save: Option<PathBuf>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_FRAMES),
+          help = format!("Number of frames, 1 to {MAX_FRAMES}; the operation's own if not given"))]
+    pub(super) frames: Option<u64>,
+    #[command(flatten)]
+    pub(super) way: Way,
+    /// Run without a window, which is what happens in any case
+    #[arg(long, conflicts_with = "offscreen")]
+    headless: bool,
+    #[command(flatten)]
+    pub(super) products: Products,
+}
+
+fn parse_step(text: &str) -> Result<Step, String> {
+    let known = Step::ALL.into_iter().find(|step| step.name() == text);
+    known.ok_or_else(|| format!("not one of {}", Step::ALL.map(Step::name).join(", ")))
+}
+
 #[derive(Clone, Copy, ValueEnum)]
 enum BroadPhaseName {
     Spatial,
@@ -237,13 +280,14 @@ impl Particles {
 
     /// Whether a window is to be shown if there can be one: nothing else was asked for.
     pub(super) fn prefers_window(&self) -> bool {
-        let pictures = self.picture.is_some() || self.frames_out.is_some();
-        self.window || !(self.headless || self.offscreen || pictures)
+        let Products { offscreen, picture, frames_out, .. } = &self.products;
+        let pictures = picture.is_some() || frames_out.is_some();
+        self.window || !(self.headless || *offscreen || pictures)
     }
 
     /// What fits no single argument.
     fn check(self) -> Result<Self, String> {
-        if self.way.grain() == Grain::Pairwise && self.objects > MAX_PAIRWISE {
+        if self.way.grain(Grain::Spatial) == Grain::Pairwise && self.objects > MAX_PAIRWISE {
             let objects = self.objects;
             return Err(format!(
                 "--objects {objects}: --broad-phase pairwise allows {MAX_PAIRWISE} particles"
@@ -304,6 +348,7 @@ fn parse_simd(text: &str) -> Result<Simd, String> {
 /// What the arguments ask for.
 pub(super) enum Outcome {
     Run(Particles),
+    Operate(CraniotomyArgs),
     Replay(ReplayArgs),
     Experiment(ExperimentArgs),
     /// Help or version, already printed.
@@ -319,6 +364,7 @@ pub(super) fn parse() -> Outcome {
     };
     let particles = match cli.command {
         Some(Command::Particles(particles)) => particles,
+        Some(Command::Craniotomy(craniotomy)) => return Outcome::Operate(craniotomy),
         Some(Command::Replay(replay)) => return Outcome::Replay(replay),
         Some(Command::Experiment(experiment)) => {
             return experiment.check().map_or_else(Outcome::Bad, Outcome::Experiment);

@@ -1,6 +1,7 @@
 //! The program: arguments in, a run, a report out.
 
 mod args;
+mod craniotomy;
 mod experiment;
 mod measure;
 mod outputs;
@@ -15,9 +16,11 @@ mod window;
 use std::error::Error;
 use std::process::ExitCode;
 
-use self::args::{ExperimentArgs, Outcome, Particles, ReplayArgs};
+use self::args::{CraniotomyArgs, ExperimentArgs, Outcome, Particles, ReplayArgs};
 use self::outputs::Outputs;
 use self::particles::RunError;
+use self::report::Report;
+use self::scenes::Patient;
 
 /// Counts the heap allocations made so far.
 pub(crate) type AllocationCounter<'a> = &'a dyn Fn() -> usize;
@@ -33,6 +36,7 @@ const BAD_ARGUMENT: u8 = 2;
 pub(crate) fn main(allocations: AllocationCounter<'_>) -> ExitCode {
     match args::parse() {
         Outcome::Run(particles) => run_particles(&particles, allocations),
+        Outcome::Operate(args) => operate(&args, allocations),
         Outcome::Replay(args) => run_replay(&args),
         Outcome::Experiment(args) => run_experiments(&args),
         Outcome::Told => ExitCode::SUCCESS,
@@ -73,7 +77,7 @@ fn run_replay(args: &ReplayArgs) -> ExitCode {
 }
 
 fn run_particles(particles: &Particles, allocations: AllocationCounter<'_>) -> ExitCode {
-    let outputs = match Outputs::open(particles) {
+    let outputs = match Outputs::open(&particles.products) {
         Ok(outputs) => outputs,
         Err(line) => return fail(&line, BAD_ARGUMENT),
     };
@@ -83,6 +87,31 @@ fn run_particles(particles: &Particles, allocations: AllocationCounter<'_>) -> E
         Err(RunError::Graphics(error)) => return fail(&with_causes(&error), NO_PICTURE),
         Err(error) => return fail(&with_causes(&error), UNSOUND),
     };
+    tell(&report, &outputs)
+}
+
+fn operate(args: &CraniotomyArgs, allocations: AllocationCounter<'_>) -> ExitCode {
+    let outputs = match Outputs::open(&args.products) {
+        Ok(outputs) => outputs,
+        Err(line) => return fail(&line, BAD_ARGUMENT),
+    };
+    // It is written anew at the end; that it can be is known now.
+    if let Err(line) = args.save.as_deref().map(outputs::open).transpose() {
+        return fail(&line, BAD_ARGUMENT);
+    }
+    let patient = match Patient::new(args.ct.as_deref()) {
+        Ok(patient) => patient,
+        Err(error) => return fail(&with_causes(&error), BAD_ARGUMENT),
+    };
+    match craniotomy::run(args, &patient, &outputs, allocations) {
+        Ok(report) => tell(&report, &outputs),
+        Err(RunError::Graphics(error)) => fail(&with_causes(&error), NO_PICTURE),
+        Err(error) => fail(&with_causes(&error), UNSOUND),
+    }
+}
+
+/// Prints and writes a report.
+fn tell(report: &Report, outputs: &Outputs) -> ExitCode {
     report.print();
     if let Some(json) = &outputs.json
         && let Err(line) = report.write(json)

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::args::Particles;
+use super::args::Products;
 use super::pictures::file_of_frame;
 
 /// The files that a run is to write; what is in them is not touched yet.
@@ -20,7 +20,7 @@ pub(super) struct Outputs {
 
 impl Outputs {
     /// Opens what `args` name, and makes the folder for the pictures of all frames.
-    pub(super) fn open(args: &Particles) -> Result<Self, String> {
+    pub(super) fn open(args: &Products) -> Result<Self, String> {
         if let Some(folder) = &args.frames_out {
             make_folder(folder)?;
             open(&file_of_frame(folder, 0))?;

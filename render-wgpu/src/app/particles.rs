@@ -4,12 +4,17 @@ use std::fs::File;
 use std::io::{self, BufWriter};
 use std::sync::Arc;
 
+use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::error::GraphicsError;
-use dualframe_sim::executor::{Entry, ExecutorError, ExecutorKind, FrameRecord};
+use dualframe_render_wgpu::look::Look;
+use dualframe_sim::blocking::Grain;
+use dualframe_sim::executor::{ExecutorError, ExecutorKind, FrameRecord};
+use dualframe_sim::image::FileError;
 use dualframe_sim::manager::{Settings, VeManager};
-use dualframe_sim::object::FaultKind;
 use dualframe_sim::record::RecordError;
 use dualframe_sim::render::{NullRenderer, Renderer};
+use dualframe_sim::scene::craniotomy::BuildError;
+use dualframe_sim::scene::head::HeadError;
 use dualframe_sim::scene::{ParticleScene, Scene, SceneError};
 use dualframe_sim::timeline::Timeline;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -21,13 +26,13 @@ use super::measure::Measure;
 use super::outputs::{self, Outputs};
 use super::pictures::Pictures;
 use super::recording::Recording;
-use super::report::{FrameMilliseconds, Report};
+use super::report::Report;
 use super::window::{Session, most_threads};
 
 /// Frames that are run serially too, to say what the speed-up is.
 const REFERENCE_FRAMES: u64 = 48;
 /// Spans of a worker that its timeline keeps for a trace; usually 65,536, some seconds of work.
-const TRACED_SPANS: usize = 1 << 16;
+pub(super) const TRACED_SPANS: usize = 1 << 16;
 /// Spans of a worker that its timeline keeps for a window; usually 4,096, more than is shown.
 const SHOWN_SPANS: usize = 1 << 12;
 
@@ -46,6 +51,12 @@ pub(super) enum RunError {
     Trace(#[source] io::Error),
     #[error(transparent)]
     Record(#[from] RecordError),
+    #[error(transparent)]
+    Operation(#[from] BuildError),
+    #[error("the image cannot be brought up to date")]
+    Drilled(#[from] HeadError),
+    #[error(transparent)]
+    Image(#[from] FileError),
 }
 
 /// The environment that `args` describe, with another number of particles.
@@ -66,8 +77,8 @@ pub(super) fn run(
     count: AllocationCounter<'_>,
     note: &dyn Fn(&str),
 ) -> Result<Report, RunError> {
-    let settings = args.way.settings();
-    let spans = if args.trace.is_some() { TRACED_SPANS } else { SHOWN_SPANS };
+    let settings = args.way.settings(Grain::Spatial);
+    let spans = if args.products.trace.is_some() { TRACED_SPANS } else { SHOWN_SPANS };
     // One more for whoever renders beside rayon's workers.
     let workers = args.way.threads.max(most_threads()) + 1;
     let timeline = Arc::new(Timeline::new(workers, spans));
@@ -126,7 +137,9 @@ fn run_unwatched(
     count: AllocationCounter<'_>,
 ) -> Result<Report, RunError> {
     let frames = args.frames();
-    let mut pictures = Pictures::new(args, scene_of(args, args.objects).room())?;
+    let room = scene_of(args, args.objects).room();
+    let look = |quality| (Look::room(room, quality), Camera::around(&room));
+    let mut pictures = Pictures::new(&args.products, frames, look)?;
     let mut measure = Measure::new(Some(frames), count);
     let bar = progress_bar(frames);
     measure.start();
@@ -161,7 +174,7 @@ fn run_unwatched(
 }
 
 /// Progress on standard error, if somebody looks at it.
-fn progress_bar(frames: u64) -> ProgressBar {
+pub(super) fn progress_bar(frames: u64) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {per_sec}, {eta} left");
     let bar = ProgressBar::new(frames);
     match style {
@@ -187,42 +200,6 @@ fn report(
     measure: &Measure<'_>,
     speed_up: Option<f64>,
 ) -> Report {
-    let (mut objects, mut nodes, mut springs) = (0, 0, 0);
-    manager.visit(&mut |object| {
-        if let Some(mesh) = object.geometry.as_mesh() {
-            objects += 1;
-            nodes += mesh.positions.len();
-            springs += mesh.topology().spring_count();
-        }
-    });
-    let seconds = measure.seconds();
-    // A window may have changed them.
-    let Settings { executor, threads, entry, .. } = manager.settings();
-    let quarantined = manager.quarantined();
-    let non_finite =
-        quarantined.iter().filter(|(_, fault)| fault.kind == FaultKind::NonFinite).count();
-    Report {
-        scene: "particles",
-        executor: executor.name(),
-        threads,
-        simd: args.way.simd().instructions().name(),
-        objects,
-        nodes,
-        springs,
-        frames: measure.frames,
-        seed: args.seed,
-        gravity: args.gravity,
-        frames_in_flight: if entry == Entry::AfterSwap { 1 } else { 2 },
-        seconds,
-        fps: measure.frames as f64 / seconds.max(f64::MIN_POSITIVE),
-        speed_up,
-        frame_ms: FrameMilliseconds::of(&measure.frame_times),
-        candidates: measure.candidates.clone(),
-        collisions: measure.collisions.clone(),
-        state_hash: format!("{:016x}", manager.state_hash()),
-        allocations: measure.allocations(),
-        stage_seconds: manager.stage_seconds().iter().map(Into::into).collect(),
-        quarantined: quarantined.iter().map(Into::into).collect(),
-        non_finite,
-    }
+    let report = Report::of("particles", args.way.simd(), manager, measure);
+    Report { seed: args.seed, gravity: args.gravity, speed_up, ..report }
 }

@@ -6,16 +6,16 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
+use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::error::GraphicsError;
 use dualframe_render_wgpu::gpu::Gpu;
 use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_render_wgpu::picture::Picture;
 use dualframe_render_wgpu::renderer::Offscreen;
-use dualframe_sim::geometry::Bounds;
 use dualframe_sim::object::Object;
 use dualframe_sim::render::Renderer;
 
-use super::args::Particles;
+use super::args::Products;
 use super::outputs;
 use super::particles::RunError;
 
@@ -34,8 +34,13 @@ pub(super) struct Pictures {
 }
 
 impl Pictures {
-    /// `None` if no pictures are wanted.
-    pub(super) fn new(args: &Particles, focus: Bounds) -> Result<Option<Self>, RunError> {
+    /// `None` if no pictures are wanted. `look` says what a picture of this quality looks like, and from
+    /// where it is taken.
+    pub(super) fn new(
+        args: &Products,
+        frames: u64,
+        look: impl FnOnce(Quality) -> (Look, Camera),
+    ) -> Result<Option<Self>, RunError> {
         let draws_every = args.offscreen || args.frames_out.is_some();
         if !draws_every && args.picture.is_none() {
             return Ok(None);
@@ -44,12 +49,14 @@ impl Pictures {
         // What is drawn for its speed is drawn as a window would; a picture is to be looked at.
         let is_for_speed = args.offscreen && args.picture.is_none() && args.frames_out.is_none();
         let quality = if is_for_speed && gpu.is_software() { Quality::Fast } else { Quality::Fine };
-        let offscreen = Offscreen::new(gpu, Look::room(focus, quality), args.size)?;
+        let (look, camera) = look(quality);
+        let mut offscreen = Offscreen::new(gpu, look, args.size)?;
+        offscreen.painter.camera = camera;
         let sequence = args.frames_out.as_deref().map(Sequence::new).transpose();
         Ok(Some(Self {
             offscreen,
             frame: 0,
-            last: args.frames() - 1,
+            last: frames - 1,
             draws_every,
             sequence: sequence.map_err(RunError::Picture)?,
             failure: None,

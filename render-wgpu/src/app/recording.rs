@@ -57,6 +57,14 @@ impl<'a> Recording<'a> {
         }
     }
 
+    /// Objects were added that follow from the environment's state.
+    pub(super) fn objects(&mut self, manager: &VeManager) -> Result<(), RecordError> {
+        match &mut self.0 {
+            Some(recorder) => recorder.objects(manager, &[]),
+            None => Ok(()),
+        }
+    }
+
     /// Ends the recording; whether there was one.
     pub(super) fn end(&mut self, manager: &VeManager) -> Result<bool, RecordError> {
         let recorder = self.0.take();

@@ -103,7 +103,7 @@ pub(super) fn run(args: &ReplayArgs) -> Result<ReplayReport, ReplayFault> {
     let any = AnyScene::of(replay.header())?;
     let mut scene = any.build(args.way.simd())?;
     replay.begin(&mut scene);
-    let mut manager = VeManager::new(scene, args.way.settings())?;
+    let mut manager = VeManager::new(scene, args.way.settings(any.grain()))?;
     let bar = ProgressBar::new_spinner();
     let began = Instant::now();
     let (manager, fault) = loop {
@@ -118,7 +118,7 @@ pub(super) fn run(args: &ReplayArgs) -> Result<ReplayReport, ReplayFault> {
             Ok(Step::Objects(spec)) => {
                 let mut scene = manager.into_scene();
                 any.add(&mut scene, &spec)?;
-                manager = VeManager::new(scene, args.way.settings())?;
+                manager = VeManager::new(scene, args.way.settings(any.grain()))?;
             }
             Err(error) => break (manager, Some(error.into())),
         }

@@ -3,10 +3,14 @@
 use std::fs::File;
 use std::io::Write;
 
-use dualframe_sim::executor::StageSeconds;
-use dualframe_sim::object::{Fault, FaultKind, ObjectId};
+use dualframe_sim::executor::{Entry, StageSeconds};
+use dualframe_sim::manager::{Settings, VeManager};
+use dualframe_sim::object::{Drawing, Fault, FaultKind, ObjectId};
+use dualframe_sim::scene::craniotomy;
+use dualframe_sim::simd::Simd;
 use serde::{Serialize, Serializer};
 
+use super::measure::Measure;
 use super::outputs;
 
 /// A run's report. The JSON keys stay as they are; more may come.
@@ -35,6 +39,50 @@ pub(super) struct Report {
     pub(super) stage_seconds: Vec<WorkerSeconds>,
     pub(super) quarantined: Vec<Quarantined>,
     pub(super) non_finite: usize,
+    /// Of a craniotomy.
+    #[serde(flatten)]
+    pub(super) operation: Option<OperationReport>,
+}
+
+/// What came of an operation.
+#[derive(Serialize)]
+pub(super) struct OperationReport {
+    pub(super) step: &'static str,
+    /// Pieces of bone that came free.
+    pub(super) pieces: usize,
+    /// Bone that was drilled away, in cubic millimetres of full bone.
+    pub(super) bone_removed_mm3: f64,
+    pub(super) score: ScoreReport,
+}
+
+/// What educators measure.
+#[derive(Serialize)]
+pub(super) struct ScoreReport {
+    seconds: f64,
+    drilling_seconds: f64,
+    air_seconds: f64,
+    peak_force_n: f32,
+    force_p95_n: f32,
+    peak_tissue_force_n: f32,
+    plunge_mm: f32,
+    dural_tears: u32,
+    dural_tear_mm: f32,
+}
+
+impl From<craniotomy::Report> for ScoreReport {
+    fn from(report: craniotomy::Report) -> Self {
+        Self {
+            seconds: report.seconds,
+            drilling_seconds: report.drilling_seconds,
+            air_seconds: report.air_seconds,
+            peak_force_n: report.peak_force,
+            force_p95_n: report.force_p95,
+            peak_tissue_force_n: report.peak_tissue_force,
+            plunge_mm: report.plunge * 1e3,
+            dural_tears: report.dural_tears,
+            dural_tear_mm: report.dural_tear_length * 1e3,
+        }
+    }
 }
 
 /// Percentiles of the times from swap to swap, in milliseconds.
@@ -98,6 +146,55 @@ impl From<&(ObjectId, Fault)> for Quarantined {
 }
 
 impl Report {
+    /// Of a run in a scene of this kind that has ended, as far as all scenes have it.
+    pub(super) fn of(
+        scene: &'static str,
+        simd: Simd,
+        manager: &VeManager,
+        measure: &Measure<'_>,
+    ) -> Self {
+        let (mut objects, mut nodes, mut springs) = (0, 0, 0);
+        manager.visit(&mut |object| {
+            // Walls are no objects to whoever counts them.
+            objects += usize::from(object.drawing != Drawing::Hidden);
+            if let Some(mesh) = object.geometry.as_mesh() {
+                nodes += mesh.positions.len();
+                springs += mesh.topology().spring_count();
+            }
+        });
+        let seconds = measure.seconds();
+        // A window may have changed them.
+        let Settings { executor, threads, entry, .. } = manager.settings();
+        let quarantined = manager.quarantined();
+        let non_finite =
+            quarantined.iter().filter(|(_, fault)| fault.kind == FaultKind::NonFinite).count();
+        Self {
+            scene,
+            executor: executor.name(),
+            threads,
+            simd: simd.instructions().name(),
+            objects,
+            nodes,
+            springs,
+            frames: measure.frames,
+            seed: 0,
+            gravity: true,
+            frames_in_flight: if entry == Entry::AfterSwap { 1 } else { 2 },
+            seconds,
+            fps: measure.frames as f64 / seconds.max(f64::MIN_POSITIVE),
+            speed_up: None,
+            frame_ms: FrameMilliseconds::of(&measure.frame_times),
+            candidates: measure.candidates.clone(),
+            collisions: measure.collisions.clone(),
+            state_hash: format!("{:016x}", manager.state_hash()),
+            allocations: measure.allocations(),
+            stage_seconds: manager.stage_seconds().iter().map(Into::into).collect(),
+            quarantined: quarantined.iter().map(Into::into).collect(),
+            non_finite,
+            operation: None,
+        }
+    }
+
     /// Whether every object came through.
     pub(super) fn is_sound(&self) -> bool {
         self.quarantined.is_empty()
@@ -118,8 +215,8 @@ impl Report {
         let Self { executor, threads, simd, objects, frames, seconds, fps, frame_ms, .. } = self;
         writeln!(
             out,
-            "particles: {objects} objects, {} nodes, {} springs; {frames} frames, seed {}",
-            self.nodes, self.springs, self.seed
+            "{}: {objects} objects, {} nodes, {} springs; {frames} frames, seed {}",
+            self.scene, self.nodes, self.springs, self.seed
         )?;
         writeln!(out, "{executor} on {threads} threads ({simd}): {fps:.1} fps, {seconds:.3} s")?;
         if let Some(speed_up) = self.speed_up {
@@ -134,6 +231,9 @@ impl Report {
         let mean = collisions as f64 / self.collisions.len().max(1) as f64;
         writeln!(out, "collisions a frame: {mean:.1}; allocations: {}", self.allocations)?;
         writeln!(out, "state hash: {}", self.state_hash)?;
+        if let Some(operation) = &self.operation {
+            operation.lines(out)?;
+        }
         writeln!(out, "\nseconds  broad phase  interaction   update   render     idle")?;
         for (index, worker) in self.stage_seconds.iter().enumerate() {
             let WorkerSeconds { broad_phase, interaction, update, render, idle } = worker;
@@ -146,5 +246,26 @@ impl Report {
             writeln!(out, "quarantined: object {object}, {fault} in frame {frame}")?;
         }
         Ok(())
+    }
+}
+
+impl OperationReport {
+    fn lines(&self, out: &mut impl Write) -> std::io::Result<()> {
+        let Self { step, pieces, bone_removed_mm3, score } = self;
+        writeln!(out, "{step}: {bone_removed_mm3:.1} mm³ of bone removed, {pieces} pieces free")?;
+        writeln!(
+            out,
+            "drilled for {:.1} s of {:.1} s, {:.1} s of it in air; force {:.1} N, 95 % below {:.2} N",
+            score.drilling_seconds,
+            score.seconds,
+            score.air_seconds,
+            score.peak_force_n,
+            score.force_p95_n
+        )?;
+        writeln!(
+            out,
+            "past the inner table by {:.2} mm; {} dural tears, {:.1} mm; soft tissue {:.2} N",
+            score.plunge_mm, score.dural_tears, score.dural_tear_mm, score.peak_tissue_force_n
+        )
     }
 }

@@ -1,7 +1,15 @@
-//! The scenes that a recording can be of.
+//! The scenes that the program knows, and that a recording can be of.
 
-use dualframe_sim::record::wire::Malformed;
+use std::hash::Hasher;
+use std::path::Path;
+use std::sync::Arc;
+
+use dualframe_sim::blocking::Grain;
+use dualframe_sim::image::{FileError, Image, Thresholds};
+use dualframe_sim::record::wire::{Decoder, Encoder, Malformed};
 use dualframe_sim::record::{Header, SceneSpec};
+use dualframe_sim::scene::craniotomy::{self, BuildError, Operation};
+use dualframe_sim::scene::head::{Head, HeadError};
 use dualframe_sim::scene::{ParticleScene, Scene, SceneError};
 use dualframe_sim::simd::Simd;
 use thiserror::Error;
@@ -9,6 +17,7 @@ use thiserror::Error;
 /// A scene of any kind.
 pub(super) enum AnyScene {
     Particles(ParticleScene),
+    Craniotomy(Patient),
 }
 
 /// Why a recording's scene cannot be built.
@@ -20,8 +29,14 @@ pub(super) enum AnySceneError {
     Malformed(#[from] Malformed),
     #[error("its scene cannot be built")]
     Build(#[from] SceneError),
+    #[error("its patient's head cannot be built")]
+    Operation(#[from] BuildError),
+    #[error(transparent)]
+    Patient(#[from] PatientError),
     #[error("objects are added, which no {kind} scene does")]
     Addition { kind: &'static str },
+    #[error("bone comes free, but there is none that is free")]
+    NothingFree,
 }
 
 impl AnyScene {
@@ -29,6 +44,7 @@ impl AnyScene {
     pub(super) fn of(header: &Header) -> Result<Self, AnySceneError> {
         match header.kind() {
             ParticleScene::KIND => Ok(Self::Particles(header.scene()?)),
+            PatientSpec::KIND => Ok(Self::Craniotomy(Patient::of(&header.scene()?)?)),
             kind => Err(AnySceneError::Kind { kind: kind.to_owned() }),
         }
     }
@@ -36,22 +52,135 @@ impl AnyScene {
     pub(super) fn kind(&self) -> &'static str {
         match self {
             Self::Particles(_) => ParticleScene::KIND,
+            Self::Craniotomy(_) => PatientSpec::KIND,
+        }
+    }
+
+    /// The broad phase that fits it.
+    pub(super) fn grain(&self) -> Grain {
+        match self {
+            Self::Particles(_) => Grain::Spatial,
+            Self::Craniotomy(_) => Grain::Pairwise,
         }
     }
 
     /// The environment at its start.
     pub(super) fn build(&self, simd: Simd) -> Result<Scene, AnySceneError> {
-        let mut scene = match self {
-            Self::Particles(particles) => particles.build()?,
+        match self {
+            Self::Particles(particles) => {
+                let mut scene = particles.build()?;
+                scene.stages.simd = simd;
+                Ok(scene)
+            }
+            Self::Craniotomy(patient) => Ok(patient.build(simd)?),
+        }
+    }
+
+    /// Adds objects as the bytes say that were recorded when they were added.
+    pub(super) fn add(&self, scene: &mut Scene, _spec: &[u8]) -> Result<(), AnySceneError> {
+        match self {
+            Self::Particles(_) => Err(AnySceneError::Addition { kind: self.kind() }),
+            Self::Craniotomy(patient) => {
+                // Which bone is free follows from the skull.
+                match Operation::new(Arc::clone(&patient.head), None).free(scene) {
+                    0 => Err(AnySceneError::NothingFree),
+                    _ => Ok(()),
+                }
+            }
+        }
+    }
+}
+
+/// Who is operated on.
+pub(super) struct Patient {
+    pub(super) head: Arc<Head>,
+    spec: PatientSpec,
+}
+
+/// What says who is operated on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct PatientSpec {
+    /// The file of the computed tomography and the hash of its voxels; none for the synthetic head.
+    ct: Option<(String, u64)>,
+}
+
+/// Why there is no patient.
+#[derive(Debug, Error)]
+pub(super) enum PatientError {
+    #[error(transparent)]
+    File(#[from] FileError),
+    #[error("no head can be made of {file}")]
+    Head {
+        file: String,
+        #[source]
+        source: HeadError,
+    },
+    #[error("{file} is not the image that the session was recorded with")]
+    Other { file: String },
+}
+
+impl Patient {
+    /// The one whose computed tomography this is; without one, the synthetic one.
+    pub(super) fn new(ct: Option<&Path>) -> Result<Self, PatientError> {
+        let named = |file: &str, made: Result<Head, HeadError>| match made {
+            Ok(head) => Ok(Arc::new(head)),
+            Err(source) => Err(PatientError::Head { file: file.to_owned(), source }),
         };
+        let Some(path) = ct else {
+            let head = named("nothing", Head::synthetic())?;
+            return Ok(Self { head, spec: PatientSpec { ct: None } });
+        };
+        let file = path.to_string_lossy().into_owned();
+        let image = Image::open(path)?;
+        let digest = digest(&image);
+        let head = named(&file, Head::from_ct(image, &Thresholds::default()))?;
+        Ok(Self { head, spec: PatientSpec { ct: Some((file, digest)) } })
+    }
+
+    /// The one that a session was recorded with.
+    fn of(spec: &PatientSpec) -> Result<Self, PatientError> {
+        let Some((file, digest)) = &spec.ct else { return Self::new(None) };
+        let patient = Self::new(Some(Path::new(file)))?;
+        let same = patient.spec.ct.as_ref().is_some_and(|(_, found)| found == digest);
+        if same { Ok(patient) } else { Err(PatientError::Other { file: file.clone() }) }
+    }
+
+    /// The environment before the operation.
+    pub(super) fn build(&self, simd: Simd) -> Result<Scene, BuildError> {
+        let mut scene = craniotomy::build(&self.head)?;
         scene.stages.simd = simd;
         Ok(scene)
     }
 
-    /// Adds objects as the bytes say that were recorded when they were added.
-    pub(super) fn add(&self, _scene: &mut Scene, _spec: &[u8]) -> Result<(), AnySceneError> {
-        match self {
-            Self::Particles(_) => Err(AnySceneError::Addition { kind: self.kind() }),
+    pub(super) fn spec(&self) -> &PatientSpec {
+        &self.spec
+    }
+}
+
+/// A hash (FNV-1a, 64 bits) of an image's sides and voxels.
+fn digest(image: &Image) -> u64 {
+    let mut hasher = fnv::FnvHasher::default();
+    image.grid().dims().iter().for_each(|side| hasher.write(&side.to_le_bytes()));
+    image.voxels().iter().for_each(|voxel| hasher.write(&voxel.to_le_bytes()));
+    hasher.finish()
+}
+
+impl SceneSpec for PatientSpec {
+    const KIND: &'static str = "craniotomy";
+
+    fn encode(&self, to: &mut Encoder<'_>) {
+        to.flag(self.ct.is_some());
+        if let Some((file, digest)) = &self.ct {
+            to.text(file);
+            to.wide(*digest);
         }
+    }
+
+    fn decode(from: &mut Decoder<'_>) -> Result<Self, Malformed> {
+        if !from.flag("a computed tomography")? {
+            return Ok(Self { ct: None });
+        }
+        let file = from.text()?.to_owned();
+        Ok(Self { ct: Some((file, from.wide()?)) })
     }
 }

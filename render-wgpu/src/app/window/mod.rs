@@ -20,6 +20,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use dualframe_render_wgpu::error::GraphicsError;
+use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::{ExecutorKind, FrameRecord};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::message::Message;
@@ -72,13 +73,13 @@ impl<'a> Session<'a> {
         let scene = particles::scene_of(args, args.objects);
         let shown = Shown {
             title: "dualframe".to_owned(),
-            size: args.size,
+            size: args.products.size,
             focus: scene.room(),
             time_step: Duration::from_secs_f32(ParticleScene::TIME_STEP),
             timeline,
         };
         let controls = Controls::new(args);
-        let view = View::open(shown, args.adapter.as_deref(), controls)?;
+        let view = View::open(shown, args.products.adapter.as_deref(), controls)?;
         Ok(Self { args, view, applied: controls, objects: args.objects, note })
     }
 
@@ -211,7 +212,8 @@ impl<'a> Session<'a> {
     fn manage(&self, scene: Scene) -> Result<VeManager, RunError> {
         let Controls { executor, threads, .. } = self.view.controls;
         let entry = self.view.controls.entry();
-        let settings = Settings { executor, threads, entry, ..self.args.way.settings() };
+        let settings =
+            Settings { executor, threads, entry, ..self.args.way.settings(Grain::Spatial) };
         let mut manager = VeManager::new(scene, settings)?;
         manager.watch(Arc::clone(&self.view.timeline));
         Ok(manager)

@@ -15,6 +15,9 @@ use crate::stages::{PairCount, Stages};
 
 /// Contact records a frame that there is room for at least, however few the objects.
 const FEWEST_CONTACTS: usize = 4_096;
+/// Contact records a frame for each node of deformable bodies, where those come to more: bodies that have
+/// grown onto several others are touched at many nodes from the first frame on.
+const CONTACTS_PER_NODE: usize = 2;
 /// Letters that may be under way at once: for each object, and at least.
 const LETTERS_PER_OBJECT: usize = 4;
 const FEWEST_LETTERS: usize = 1_024;
@@ -44,7 +47,10 @@ impl Tables {
         homes: usize,
     ) -> Self {
         let objects: usize = blocks.iter().map(|block| block.objects().len()).sum();
-        let contacts = 2 * (objects * CONTACTS_PER_OBJECT + FEWEST_CONTACTS);
+        let nodes = blocks.iter().flat_map(Block::objects).filter_map(|o| o.geometry.as_mesh());
+        let nodes: usize = nodes.map(|mesh| mesh.positions.len()).sum();
+        let touched = (objects * CONTACTS_PER_OBJECT).max(nodes * CONTACTS_PER_NODE);
+        let contacts = 2 * (touched + FEWEST_CONTACTS);
         let letters = (objects * LETTERS_PER_OBJECT + FEWEST_LETTERS).max(2 * under_way);
         let queues = queue_slots(blocks.len(), interactions.len(), letters, homes);
         Self {
