@@ -11,6 +11,7 @@ use dualframe_sim::experiment::load::{RenderLoad, StandIn};
 use dualframe_sim::experiment::race::{Race, Runner, WARM_UP};
 use dualframe_sim::experiment::speedup::efficiency;
 use dualframe_sim::experiment::statistics::Quartiles;
+use dualframe_sim::experiment::subject::Subject;
 use dualframe_sim::scene::ParticleScene;
 
 /// Measurements of what threads without anything in common gain.
@@ -33,10 +34,11 @@ fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
     }
     let mut lines = Vec::new();
     for objects in arguments.objects_or(&hundreds) {
-        let scene = ParticleScene::new(objects);
-        for load in [RenderLoad::Null, RenderLoad::StandIn(StandIn::calibrated(scene)?)] {
+        let subject = Subject::Particles(ParticleScene::new(objects));
+        for load in [RenderLoad::Null, RenderLoad::StandIn(StandIn::calibrated(&subject)?)] {
             let frames = arguments.frames_for(objects, 20_000);
-            let race = Race { scene, load, warm_up: WARM_UP, frames, rounds: arguments.rounds };
+            let (subject, rounds) = (subject.clone(), arguments.rounds);
+            let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };
             let outcome = race.run(&runners, &mut || calibrator.phase(), &mut || ())?;
             common::print(&race.to_string(), &outcome.series, race.frames as f64);
             let over = |other| outcome.median_speed_up(pipeline, other).unwrap_or(f64::NAN);

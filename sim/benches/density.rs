@@ -9,6 +9,7 @@ use dualframe_sim::experiment::calibrator::Calibrator;
 use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::load::RenderLoad;
 use dualframe_sim::experiment::race::{Race, Runner, WARM_UP};
+use dualframe_sim::experiment::subject::Subject;
 use dualframe_sim::experiment::timing::{Contender, Series};
 use dualframe_sim::scene::ParticleScene;
 
@@ -24,7 +25,8 @@ fn density(arguments: &common::Arguments) -> Result<(), ExperimentError> {
         let contender = |&objects: &usize| {
             let frames = arguments.frames_for(objects, 40_000);
             let (scene, load) = (ParticleScene::new(objects), RenderLoad::Null);
-            let race = Race { scene, load, warm_up: WARM_UP, frames, rounds: 1 };
+            let subject = Subject::Particles(scene);
+            let race = Race { subject, load, warm_up: WARM_UP, frames, rounds: 1 };
             let run = move || Ok(race.seconds(runner)? / frames as f64);
             Contender { label: objects.to_string(), spins: false, run: Box::new(run) }
         };

@@ -9,6 +9,7 @@ use dualframe_sim::experiment::calibrator::Calibrator;
 use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::load::RenderLoad;
 use dualframe_sim::experiment::race::{Race, Runner, WARM_UP};
+use dualframe_sim::experiment::subject::Subject;
 use dualframe_sim::scene::ParticleScene;
 
 fn main() -> ExitCode {
@@ -21,7 +22,7 @@ fn overhead(arguments: &common::Arguments) -> Result<(), ExperimentError> {
     let mut lines = Vec::new();
     for objects in arguments.objects_or(&hundreds) {
         let race = Race {
-            scene: ParticleScene::new(objects),
+            subject: Subject::Particles(ParticleScene::new(objects)),
             load: RenderLoad::Null,
             warm_up: WARM_UP,
             frames: arguments.frames_for(objects, 20_000),

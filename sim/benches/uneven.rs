@@ -10,6 +10,7 @@ use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::load::RenderLoad;
 use dualframe_sim::experiment::race::{Race, Runner, WARM_UP};
 use dualframe_sim::experiment::statistics::Quartiles;
+use dualframe_sim::experiment::subject::Subject;
 use dualframe_sim::scene::ParticleScene;
 
 /// The most substeps of an object.
@@ -34,7 +35,8 @@ fn uneven(arguments: &common::Arguments) -> Result<(), ExperimentError> {
                 ParticleScene { seed, most_substeps: MOST_SUBSTEPS, ..ParticleScene::new(objects) };
             let frames = arguments.frames_for(objects, 4_000);
             let (load, rounds) = (RenderLoad::Null, arguments.rounds);
-            let race = Race { scene, load, warm_up: WARM_UP, frames, rounds };
+            let subject = Subject::Particles(scene);
+            let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };
             let outcome = race.run(&runners, &mut || calibrator.phase(), &mut || ())?;
             common::print(&race.to_string(), &outcome.series, race.frames as f64);
             for (ratios, &other) in ratios.iter_mut().zip(&others) {

@@ -19,7 +19,7 @@
 //! | §6.3: haptic devices | [`device`] |
 //! | §7.1.1: particles | [`scene`] |
 //! | §7.2: the pipeline and what it is compared with | [`executor`] |
-//! | §7–§8: Eqs. 2–4, Figs. 11–17, Table 1 | `experiment`, with the feature of that name |
+//! | §7–§8: Eqs. 2–4, Figs. 11–18, Table 1 | `experiment`, with the feature of that name |
 //! | (not in the paper) computed tomography in, volumes out | `image`, with the feature of that name |
 //! | (not in the paper) what each worker did when | [`timeline`] |
 //! | (not in the paper) sessions recorded and replayed, bit for bit | [`record`] |

@@ -5,8 +5,14 @@
 use std::fs;
 
 use dualframe_sim::executor::ExecutorKind;
-use dualframe_sim::experiment::plan::{Plan, Sweep};
+use dualframe_sim::experiment::plan::{Plan, Retraction, Sweep};
+use dualframe_sim::experiment::race::Runner;
+use dualframe_sim::experiment::subject::Subject;
 use dualframe_sim::experiment::{Experiment, PAGE, run};
+use dualframe_sim::manager::VeManager;
+use dualframe_sim::render::NullRenderer;
+use dualframe_sim::scene::craniotomy::{OBJECTS, TOOLS};
+use glam::Vec3;
 
 fn tiny() -> Plan {
     let sweep = |objects: &[usize], rounds| Sweep { objects: objects.to_vec(), frames: 5, rounds };
@@ -17,6 +23,7 @@ fn tiny() -> Plan {
         load_balance: sweep(&[4, 500], 1),
         per_frame: sweep(&[5], 2),
         compare: sweep(&[3, 5], 2),
+        retraction: Retraction { threads: vec![1, 2], keeps_core: true, frames: 2, rounds: 1 },
     }
 }
 
@@ -45,13 +52,15 @@ fn all_experiments() {
     assert_eq!(rows("per-frame-summary.csv"), 2);
     assert_eq!(rows("per-frame-rounds.csv"), 2 * 2);
     assert_eq!(rows("compare-rounds.csv"), 2 * 2 * 2 * runners);
+    assert_eq!(rows("compare-craniotomy-rounds.csv"), 2 * runners);
     // Over all rounds there is a row for each; over the good ones, if there are any.
     assert!((2 * 3..=2 * 2 * 3).contains(&rows("scalability.csv")));
     assert!((4 * runners..=2 * 4 * runners).contains(&rows("compare.csv")));
+    assert!((2 * runners..=2 * 2 * runners).contains(&rows("compare-craniotomy.csv")));
 
     let page = read(PAGE);
     let figures: Vec<_> = reports.iter().flat_map(|report| &report.figures).collect();
-    assert_eq!(figures.len(), 3 + 1 + 2 + 4);
+    assert_eq!(figures.len(), 3 + 1 + 2 + 4 + 2);
     for figure in figures {
         assert_eq!(read(&format!("{}.svg", figure.name)), figure.svg);
         let png =
@@ -65,6 +74,7 @@ fn all_experiments() {
         assert!(!page.contains(outside), "{outside}: the page needs nothing else");
     }
     assert!(page.contains("seed 3") && page.contains("Table 1"));
+    assert!(page.contains("One core is kept for haptics."));
 }
 
 #[test]
@@ -72,4 +82,29 @@ fn a_folder_that_is_not_there() {
     let out = std::path::Path::new("/no/such/folder");
     let error = run(&[Experiment::PerFrame], &tiny(), out, &mut |_, _| ()).err();
     assert!(error.is_some_and(|error| error.to_string().contains("/no/such/folder")));
+}
+
+fn hands(manager: &VeManager) -> Vec<Vec3> {
+    let mut hands = Vec::new();
+    manager.visit(&mut |object| {
+        if TOOLS.contains(&object.id()) {
+            hands.push(object.center());
+        }
+    });
+    hands
+}
+
+#[test]
+fn a_retraction_is_of_thirty_objects_and_moves_its_hands() {
+    let subject = Subject::retraction().expect("a head");
+    let mut session = subject.start(Runner::SERIAL).expect("a valid environment");
+    let mut objects = 0;
+    session.manager.visit(&mut |_| objects += 1);
+    assert_eq!((objects, subject.objects(), OBJECTS), (30, 30, 30));
+    let before = hands(&session.manager);
+    session.run(30, &mut NullRenderer::new(), &mut |_| ()).expect("it runs");
+    // The scalpel is brought to the skin at 0.1 m/s.
+    let way = before[0].distance(hands(&session.manager)[0]);
+    assert!(way > 0.02, "the right hand moved by {way} m");
+    assert!(subject.script_frames() > 30);
 }

@@ -162,6 +162,8 @@ fn bad_experiments() {
     refused(&["experiment", "nonsense", "--out", out], "nonsense");
     refused(&["experiment", "all", "--nonsense", "--out", out], "--nonsense");
     refused(&["experiment", "all", "more", "--out", out], "more");
+    refused(&["experiment", "compare", "--scene", "nonsense", "--out", out], "nonsense");
+    refused(&["experiment", "per-frame", "--scene", "craniotomy", "--out", out], "--scene");
     refused(&["experiment", "all"], "--out");
     refused(&["experiment", "--out", out], "WHICH");
     assert!(!Path::new(out).exists());

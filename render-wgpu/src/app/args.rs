@@ -51,9 +51,12 @@ pub(super) struct ExperimentArgs {
     /// Which experiment.
     #[arg(value_enum)]
     which: ExperimentName,
-    /// Smaller sizes: about two minutes for all on two cores.
+    /// Smaller sizes: a few minutes for all on two cores.
     #[arg(long)]
     quick: bool,
+    /// What `compare` runs; `all` runs both
+    #[arg(long, value_name = "NAME", value_enum)]
+    scene: Option<SceneName>,
     /// The folder to write into, which is made if it is not there.
     #[arg(long, value_name = "DIR")]
     pub(super) out: PathBuf,
@@ -67,10 +70,18 @@ enum ExperimentName {
     LoadBalance,
     /// Fig. 15: collisions and speed-up of each frame.
     PerFrame,
-    /// Figs. 16 and 17: the pipeline against every other executor.
+    /// Figs. 16 and 17, or Fig. 18: the pipeline against every other executor.
     Compare,
     /// All of them.
     All,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum SceneName {
+    /// Figs. 16 and 17 (the default).
+    Particles,
+    /// Fig. 18: automated retraction.
+    Craniotomy,
 }
 
 impl ExperimentArgs {
@@ -79,13 +90,24 @@ impl ExperimentArgs {
             ExperimentName::Scalability => vec![Experiment::Scalability],
             ExperimentName::LoadBalance => vec![Experiment::LoadBalance],
             ExperimentName::PerFrame => vec![Experiment::PerFrame],
-            ExperimentName::Compare => vec![Experiment::Compare],
+            ExperimentName::Compare => match self.scene {
+                Some(SceneName::Craniotomy) => vec![Experiment::Retraction],
+                Some(SceneName::Particles) | None => vec![Experiment::Compare],
+            },
             ExperimentName::All => Experiment::ALL.to_vec(),
         }
     }
 
     pub(super) fn plan(&self) -> Plan {
         if self.quick { Plan::quick() } else { Plan::full() }
+    }
+
+    /// What fits no single argument.
+    fn check(self) -> Result<Self, String> {
+        match (self.which, self.scene) {
+            (ExperimentName::Compare, _) | (_, None) => Ok(self),
+            (_, Some(_)) => Err("--scene is for `compare` only".to_owned()),
+        }
     }
 }
 
@@ -344,7 +366,9 @@ pub(super) fn parse() -> Outcome {
         Some(Command::Particles(particles)) => particles,
         Some(Command::Craniotomy(craniotomy)) => return Outcome::Operate(craniotomy),
         Some(Command::Replay(replay)) => return Outcome::Replay(replay),
-        Some(Command::Experiment(experiment)) => return Outcome::Experiment(experiment),
+        Some(Command::Experiment(experiment)) => {
+            return experiment.check().map_or_else(Outcome::Bad, Outcome::Experiment);
+        }
         None => cli.particles,
     };
     particles.check().map_or_else(Outcome::Bad, Outcome::Run)

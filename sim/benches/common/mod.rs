@@ -33,6 +33,7 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     /// Numbers of particles: those asked for, or else `usual`.
+    #[allow(dead_code, reason = "not every bench is of particles")]
     pub(crate) fn objects_or(&self, usual: &[usize]) -> Vec<usize> {
         if self.test {
             vec![8]

@@ -1,10 +1,12 @@
-//! The comparative study (§7.2.3): Figs. 16 and 17.
+//! The comparative study (§7.2.3): Figs. 16 to 18.
 
 use super::error::ExperimentError;
 use super::figure::{Chart, Figure, Line};
 use super::load::{RenderLoad, StandIn};
 use super::outcome::{Outcome, marked};
+use super::plan::Plan;
 use super::race::{Race, Runner, WARM_UP};
+use super::subject::Subject;
 use super::{Laboratory, Report};
 use crate::executor::ExecutorKind;
 use crate::scene::ParticleScene;
@@ -15,82 +17,148 @@ const NAMES: [[&str; 2]; 2] = [
     ["fig17-heavy-load", "fig17-heavy-load-rendering"],
 ];
 
-pub(super) fn run(laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentError> {
-    let plan = laboratory.plan;
-    let sweep = &plan.compare;
-    let parallel = plan.threads.iter().copied().flat_map(Runner::parallel);
-    let runners: Vec<Runner> = std::iter::once(Runner::SERIAL).chain(parallel).collect();
-    let mut rounds = Outcome::rounds_table("compare-rounds");
-    let mut summary = Outcome::summary_table("compare");
-    let mut figures = Vec::new();
-    for (&objects, names) in sweep.objects.iter().zip(NAMES) {
-        let scene = ParticleScene { seed: plan.seed, ..ParticleScene::new(objects) };
-        let loads = [RenderLoad::Null, RenderLoad::StandIn(StandIn::calibrated(scene)?)];
-        for (load, name) in loads.into_iter().zip(names) {
-            let frames = sweep.frames;
-            let race = Race { scene, load, warm_up: WARM_UP, frames, rounds: sweep.rounds };
-            let outcome = laboratory.race(race, &runners)?;
-            outcome.add_rounds(&mut rounds);
-            outcome.add_summary(&mut summary);
-            figures.push(figure(name, &outcome, &plan.threads)?);
-        }
-    }
-    Ok(Report { tables: vec![summary, rounds], figures, shown: None })
-}
-
-fn figure(
-    name: &'static str,
-    outcome: &Outcome,
-    threads: &[usize],
-) -> Result<Figure, ExperimentError> {
-    let kinds = Runner::parallel(1).map(|runner| runner.executor);
-    let lines = kinds.enumerate().map(|(color, executor)| Line {
-        label: executor.name().to_owned(),
-        points: points(outcome, executor, threads),
-        dashed: false,
-        color,
-    });
-    let objects = outcome.race.scene.objects;
-    let rendering = match outcome.race.load {
-        RenderLoad::Null => "",
-        RenderLoad::StandIn(_) => ", rendering 15 % of the work",
-    };
-    Chart {
-        name,
-        title: format!("Speed-up over serial, {objects} objects{rendering}"),
-        x_label: "threads",
-        y_label: "speed-up S_s = T_s / T_p",
-        x_counts: true,
-        finding: finding(outcome, threads) + &marked([outcome]),
+/// Figs. 16 and 17.
+pub(super) fn particles(laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentError> {
+    let Plan { seed, threads, compare, .. } = laboratory.plan;
+    let study = Study {
+        tables: ["compare", "compare-rounds"],
+        threads,
+        frames: compare.frames,
+        rounds: compare.rounds,
+        note: String::new(),
         paper: "The pipeline is the fastest, 8 to 28 % ahead of OpenMP and TBB with 2 to 6 threads \
                 (§8.3).",
+    };
+    let scene = |&objects| ParticleScene { seed: *seed, ..ParticleScene::new(objects) };
+    let subjects = compare.objects.iter().map(scene).map(Subject::Particles);
+    study.run(laboratory, subjects.zip(NAMES))
+}
+
+/// Fig. 18.
+pub(super) fn retraction(laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentError> {
+    let plan = &laboratory.plan.retraction;
+    let subject = Subject::retraction()?;
+    let core = if plan.keeps_core {
+        "One core is kept for haptics."
+    } else {
+        "There are too few cores to keep one for haptics."
+    };
+    let study = Study {
+        tables: ["compare-craniotomy", "compare-craniotomy-rounds"],
+        threads: &plan.threads,
+        frames: plan.frames,
+        rounds: plan.rounds,
+        note: format!(
+            "{core} {} frames, of which the hands move in the first {}. ",
+            plan.frames + WARM_UP,
+            subject.script_frames()
+        ),
+        paper: "The pipeline is the fastest, 1.3 to 1.6 times as fast as OpenMP and TBB with 2 to 5 \
+                threads; one core is kept for haptics, and the serial version runs at 99 frames per \
+                second (§8.3, Fig. 18).",
+    };
+    study.run(laboratory, [(subject, ["fig18-retraction", "fig18-retraction-rendering"])])
+}
+
+/// The serial executor, and every other with each of these numbers of threads.
+pub(super) fn runners(threads: &[usize]) -> Vec<Runner> {
+    let parallel = threads.iter().copied().flat_map(Runner::parallel);
+    std::iter::once(Runner::SERIAL).chain(parallel).collect()
+}
+
+/// Subjects with which every executor is timed, and what is said of them.
+struct Study<'a> {
+    /// The names of the summary and of the table of rounds.
+    tables: [&'static str; 2],
+    threads: &'a [usize],
+    frames: u64,
+    rounds: usize,
+    /// What is to be known of the figures besides what was found: nothing, or whole sentences.
+    note: String,
+    paper: &'static str,
+}
+
+impl Study<'_> {
+    /// Times subjects without and with rendering, for figures of such names.
+    fn run(
+        &self,
+        laboratory: &mut Laboratory<'_>,
+        subjects: impl IntoIterator<Item = (Subject, [&'static str; 2])>,
+    ) -> Result<Report, ExperimentError> {
+        let runners = runners(self.threads);
+        let [summary, rounds] = self.tables;
+        let mut summary = Outcome::summary_table(summary);
+        let mut all_rounds = Outcome::rounds_table(rounds);
+        let mut figures = Vec::new();
+        for (subject, names) in subjects {
+            let loads = [RenderLoad::Null, RenderLoad::StandIn(StandIn::calibrated(&subject)?)];
+            for (load, name) in loads.into_iter().zip(names) {
+                let (subject, &Self { frames, rounds, .. }) = (subject.clone(), self);
+                let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };
+                let outcome = laboratory.race(race, &runners)?;
+                outcome.add_rounds(&mut all_rounds);
+                outcome.add_summary(&mut summary);
+                figures.push(self.figure(name, &outcome)?);
+            }
+        }
+        Ok(Report { tables: vec![summary, all_rounds], figures, shown: None })
     }
-    .lines(lines.collect())
-}
 
-fn points(outcome: &Outcome, executor: ExecutorKind, threads: &[usize]) -> Vec<(f64, f64)> {
-    let point = |&threads: &usize| {
-        let runner = Runner { executor, threads };
-        Some((threads as f64, outcome.median_speed_up(runner, Runner::SERIAL)?))
-    };
-    threads.iter().filter_map(point).collect()
-}
+    fn figure(&self, name: &'static str, outcome: &Outcome) -> Result<Figure, ExperimentError> {
+        let kinds = Runner::parallel(1).map(|runner| runner.executor);
+        let lines = kinds.enumerate().map(|(color, executor)| Line {
+            label: executor.name().to_owned(),
+            points: self.points(outcome, executor),
+            dashed: false,
+            color,
+        });
+        let subject = match &outcome.race.subject {
+            Subject::Particles(scene) => format!("{} objects", scene.objects),
+            Subject::Retraction(_) => "automated retraction".to_owned(),
+        };
+        let rendering = match outcome.race.load {
+            RenderLoad::Null => "",
+            RenderLoad::StandIn(_) => ", rendering 15 % of the work",
+        };
+        Chart {
+            name,
+            title: format!("Speed-up over serial, {subject}{rendering}"),
+            x_label: "threads",
+            y_label: "speed-up S_s = T_s / T_p",
+            x_counts: true,
+            finding: self.finding(outcome) + &self.note + &marked([outcome]),
+            paper: self.paper,
+        }
+        .lines(lines.collect())
+    }
 
-/// How the pipeline does against the fastest of the others, with the most threads.
-fn finding(outcome: &Outcome, threads: &[usize]) -> String {
-    let threads = threads.iter().copied().max().unwrap_or(1);
-    let pipeline = Runner::pipeline(threads);
-    let others = Runner::parallel(threads).filter(|&runner| runner != pipeline);
-    let ratio = |other: Runner| Some((other, outcome.median_speed_up(pipeline, other)?));
-    let closest = others.filter_map(ratio).min_by(|(_, a), (_, b)| a.total_cmp(b));
-    let (Some((other, ratio)), Some(speed_up)) =
-        (closest, outcome.median_speed_up(pipeline, Runner::SERIAL))
-    else {
-        return String::new();
-    };
-    format!(
-        "{} reaches {speed_up:.2}, {ratio:.3} times the fastest other, {}. ",
-        pipeline.label(),
-        other.label()
-    )
+    fn points(&self, outcome: &Outcome, executor: ExecutorKind) -> Vec<(f64, f64)> {
+        let point = |&threads: &usize| {
+            let runner = Runner { executor, threads };
+            Some((threads as f64, outcome.median_speed_up(runner, Runner::SERIAL)?))
+        };
+        self.threads.iter().filter_map(point).collect()
+    }
+
+    /// How the pipeline does against the fastest of the others, with the most threads.
+    fn finding(&self, outcome: &Outcome) -> String {
+        let threads = self.threads.iter().copied().max().unwrap_or(1);
+        let pipeline = Runner::pipeline(threads);
+        let others = Runner::parallel(threads).filter(|&runner| runner != pipeline);
+        let ratio = |other: Runner| Some((other, outcome.median_speed_up(pipeline, other)?));
+        let closest = others.filter_map(ratio).min_by(|(_, a), (_, b)| a.total_cmp(b));
+        let serial = outcome.throughput(outcome.series.best_rounds(), Runner::SERIAL);
+        let (Some((other, ratio)), Some(speed_up), Some(serial)) =
+            (closest, outcome.median_speed_up(pipeline, Runner::SERIAL), serial)
+        else {
+            return String::new();
+        };
+        format!(
+            "{} reaches {speed_up:.2} times the serial version's {:.0} frames per second, {ratio:.3} \
+             times the fastest other, {}. ",
+            pipeline.label(),
+            serial.median,
+            other.label()
+        )
+    }
 }

@@ -7,6 +7,8 @@ use thiserror::Error;
 
 use crate::executor::ExecutorError;
 use crate::scene::SceneError;
+use crate::scene::craniotomy::BuildError;
+use crate::scene::head::HeadError;
 
 /// Why an experiment failed.
 #[derive(Debug, Error)]
@@ -14,6 +16,12 @@ pub enum ExperimentError {
     /// The environment cannot be built.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// The head to be operated on cannot be built.
+    #[error(transparent)]
+    Head(#[from] HeadError),
+    /// The environment of an operation cannot be built.
+    #[error(transparent)]
+    Operation(#[from] BuildError),
     /// An executor cannot be built, or cannot go on.
     #[error(transparent)]
     Executor(#[from] ExecutorError),

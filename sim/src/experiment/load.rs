@@ -1,12 +1,11 @@
 //! What stands in for a graphics device while executors are compared.
 
 use super::error::ExperimentError;
+use super::race::{Race, Runner};
+use super::subject::Subject;
 use super::work::{spin, steps_per_second};
-use crate::executor::ExecutorKind;
-use crate::manager::{Settings, VeManager};
 use crate::object::Object;
 use crate::render::{NullRenderer, Renderer};
-use crate::scene::ParticleScene;
 
 /// The share of a serial frame's work that the stand-in makes of rendering; usually 0.15.
 pub const RENDER_SHARE: f64 = 0.15;
@@ -54,16 +53,16 @@ pub struct StandIn {
 }
 
 impl StandIn {
-    /// A stand-in that makes rendering [`RENDER_SHARE`] of a scene's serial frame.
+    /// A stand-in that makes rendering [`RENDER_SHARE`] of a subject's serial frame.
     ///
     /// # Errors
-    /// The scene cannot be built or run.
-    pub fn calibrated(scene: ParticleScene) -> Result<Self, ExperimentError> {
+    /// The environment cannot be built or run.
+    pub fn calibrated(subject: &Subject) -> Result<Self, ExperimentError> {
         let mut frame = f64::INFINITY;
         for _ in 0..RUNS {
-            frame = frame.min(serial_frame(scene)?);
+            frame = frame.min(serial_frame(subject)?);
         }
-        let spinning = frame * RENDER_SHARE / (1.0 - RENDER_SHARE) / scene.objects as f64;
+        let spinning = frame * RENDER_SHARE / (1.0 - RENDER_SHARE) / subject.objects() as f64;
         Ok(Self { steps: (spinning * steps_per_second()) as u64 })
     }
 }
@@ -77,23 +76,21 @@ impl Renderer for StandIn {
 }
 
 /// Seconds of a serial frame without rendering.
-fn serial_frame(scene: ParticleScene) -> Result<f64, ExperimentError> {
-    let settings = Settings { executor: ExecutorKind::Serial, threads: 1, ..Settings::default() };
-    let mut manager = VeManager::new(scene.build()?, settings)?;
-    let mut idle = StandIn { steps: 0 };
-    manager.run(WARM_UP, &mut idle, &mut |_| ())?;
-    let began = std::time::Instant::now();
-    manager.run(FRAMES, &mut idle, &mut |_| ())?;
-    Ok(began.elapsed().as_secs_f64() / FRAMES as f64)
+fn serial_frame(subject: &Subject) -> Result<f64, ExperimentError> {
+    let (subject, load) = (subject.clone(), RenderLoad::StandIn(StandIn { steps: 0 }));
+    let race = Race { subject, load, warm_up: WARM_UP, frames: FRAMES, rounds: 1 };
+    Ok(race.seconds(Runner::SERIAL)? / FRAMES as f64)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::ParticleScene;
 
     #[test]
     fn a_calibrated_stand_in_works() {
-        let stand_in = StandIn::calibrated(ParticleScene::new(5)).expect("a valid scene");
+        let subject = Subject::Particles(ParticleScene::new(5));
+        let stand_in = StandIn::calibrated(&subject).expect("a valid scene");
         assert!(stand_in.steps > 0);
     }
 }

@@ -4,10 +4,10 @@ use super::error::ExperimentError;
 use super::figure::{Chart, Figure};
 use super::race::Runner;
 use super::scalability::range;
+use super::subject::Subject;
 use super::table::Table;
 use super::{Laboratory, Report};
 use crate::executor::StageSeconds;
-use crate::manager::VeManager;
 use crate::render::NullRenderer;
 use crate::scene::ParticleScene;
 
@@ -47,8 +47,9 @@ pub(super) fn run(laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentE
     let mut balances = Vec::new();
     for &objects in &sweep.objects {
         let scene = ParticleScene { seed: plan.seed, ..ParticleScene::new(objects) };
+        let subject = Subject::Particles(scene);
         let before = laboratory.calibrator.phase();
-        let workers = stage_seconds(scene, Runner::pipeline(plan.most_threads()), sweep.frames)?;
+        let workers = stage_seconds(&subject, Runner::pipeline(plan.most_threads()), sweep.frames)?;
         let phase = before.worse(laboratory.calibrator.phase());
         for (index, worker) in workers.iter().enumerate() {
             let StageSeconds { broad_phase, interaction, update, render, idle } = worker;
@@ -82,17 +83,17 @@ pub(super) fn run(laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentE
 
 /// What each worker of a run spent its time on.
 fn stage_seconds(
-    scene: ParticleScene,
+    subject: &Subject,
     runner: Runner,
     frames: u64,
 ) -> Result<Vec<StageSeconds>, ExperimentError> {
-    let mut manager = VeManager::new(scene.build()?, runner.settings())?;
-    manager.run(frames, &mut NullRenderer::new(), &mut |_| ())?;
-    let objects = manager.quarantined().len();
+    let mut session = subject.start(runner)?;
+    session.run(frames, &mut NullRenderer::new(), &mut |_| ())?;
+    let objects = session.manager.quarantined().len();
     if objects > 0 {
         return Err(ExperimentError::Quarantined { run: runner.label(), objects });
     }
-    Ok(manager.stage_seconds())
+    Ok(session.manager.stage_seconds())
 }
 
 fn total(worker: &StageSeconds) -> f64 {

@@ -1,4 +1,4 @@
-//! The paper's experiments (§7–§8): Eqs. 2–4, Figs. 11–17 and Table 1 on this machine.
+//! The paper's experiments (§7–§8): Eqs. 2–4, Figs. 11–18 and Table 1 on this machine.
 //!
 //! Whatever is compared runs interleaved in one process, in rounds whose order rotates, with a
 //! [`calibrator`] beside each round. Rounds in a bad phase of the machine are marked and counted, never
@@ -12,6 +12,7 @@
 //! | §7.2.2, Fig. 14, Table 1 | [`Experiment::LoadBalance`] |
 //! | §7.2.2, Fig. 15 | [`Experiment::PerFrame`] |
 //! | §7.2.3, Figs. 16 and 17 | [`Experiment::Compare`] |
+//! | §7.2.3, Fig. 18 | [`Experiment::Retraction`] |
 
 pub mod calibrator;
 mod compare;
@@ -28,6 +29,7 @@ pub mod race;
 mod scalability;
 pub mod speedup;
 pub mod statistics;
+pub mod subject;
 pub mod table;
 pub mod timing;
 mod work;
@@ -55,14 +57,16 @@ pub enum Experiment {
     LoadBalance,
     /// Collisions and speed-up of each frame.
     PerFrame,
-    /// The pipeline against every other executor.
+    /// The pipeline against every other executor, with particles.
     Compare,
+    /// The same with automated retraction in a craniotomy.
+    Retraction,
 }
 
 impl Experiment {
     /// All of them, in the paper's order.
-    pub const ALL: [Self; 4] =
-        [Self::Scalability, Self::LoadBalance, Self::PerFrame, Self::Compare];
+    pub const ALL: [Self; 5] =
+        [Self::Scalability, Self::LoadBalance, Self::PerFrame, Self::Compare, Self::Retraction];
 
     /// The name by which the program knows it.
     #[must_use]
@@ -72,6 +76,7 @@ impl Experiment {
             Self::LoadBalance => "load-balance",
             Self::PerFrame => "per-frame",
             Self::Compare => "compare",
+            Self::Retraction => "retraction",
         }
     }
 
@@ -83,10 +88,11 @@ impl Experiment {
             Self::Scalability => plan.scalability.work(1 + threads, WARM_UP),
             Self::LoadBalance => plan.load_balance.work(1, 0),
             Self::PerFrame => plan.per_frame.work(threads, 0),
-            Self::Compare => {
-                let runners = 1 + threads * Runner::parallel(1).count();
-                // Without and with rendering.
-                2 * plan.compare.work(runners, WARM_UP)
+            // Without and with rendering.
+            Self::Compare => 2 * plan.compare.work(compare::runners(&plan.threads).len(), WARM_UP),
+            Self::Retraction => {
+                let runners = compare::runners(&plan.retraction.threads).len();
+                2 * plan.retraction.work(runners, WARM_UP)
             }
         }
     }
@@ -96,7 +102,8 @@ impl Experiment {
             Self::Scalability => scalability::run(laboratory),
             Self::LoadBalance => load_balance::run(laboratory),
             Self::PerFrame => per_frame::run(laboratory),
-            Self::Compare => compare::run(laboratory),
+            Self::Compare => compare::particles(laboratory),
+            Self::Retraction => compare::retraction(laboratory),
         }
     }
 }
@@ -167,7 +174,7 @@ impl Laboratory<'_> {
         runners: &[Runner],
         on_frame: &mut OnFrame<'_>,
     ) -> Result<Outcome, ExperimentError> {
-        let work = race.scene.objects as u64 * (race.warm_up + race.frames);
+        let work = race.subject.objects() as u64 * (race.warm_up + race.frames);
         let calibrator = self.calibrator;
         let mut phase = || calibrator.phase();
         let mut done = || self.advance(work);

@@ -42,7 +42,7 @@ const SUMMARY_COLUMNS: [&str; 17] = [
 ];
 
 /// A race that was run.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Outcome {
     /// What was run.
     pub race: Race,
@@ -86,13 +86,13 @@ impl Outcome {
 
     /// Adds a row for each runner and round.
     pub fn add_rounds(&self, table: &mut Table) {
-        let Race { scene, load, frames, .. } = &self.race;
+        let Race { subject, load, frames, .. } = &self.race;
         for (number, (round, bad)) in
             self.series.rounds().iter().zip(self.series.marks()).enumerate()
         {
             for (runner, seconds) in self.runners.iter().zip(&round.seconds) {
                 table.push(&[
-                    &scene.objects,
+                    &subject.objects(),
                     &load.name(),
                     &runner.executor.name(),
                     &runner.threads,
@@ -132,7 +132,7 @@ impl Outcome {
         let cell =
             |value: Option<f64>| value.map(|value| format!("{value:.4}")).unwrap_or_default();
         table.push(&[
-            &self.race.scene.objects,
+            &self.race.subject.objects(),
             &self.race.load.name(),
             &runner.executor.name(),
             &runner.threads,

@@ -8,6 +8,7 @@ use super::race::{Race, Runner};
 use super::scalability::named;
 use super::speedup::speed_up;
 use super::statistics::{Quartiles, variance};
+use super::subject::Subject;
 use super::table::Table;
 use super::timing::Rounds;
 use super::{Laboratory, Report};
@@ -37,7 +38,8 @@ fn measure(laboratory: &mut Laboratory<'_>) -> Result<Frames, ExperimentError> {
     let scene = ParticleScene { seed: plan.seed, gravity: true, ..ParticleScene::new(objects) };
     let (frames, rounds) = (sweep.frames, sweep.rounds);
     // The first frames matter here: they hold most collisions.
-    let race = Race { scene, load: RenderLoad::Null, warm_up: 0, frames, rounds };
+    let subject = Subject::Particles(scene);
+    let race = Race { subject, load: RenderLoad::Null, warm_up: 0, frames, rounds };
     let runners: Vec<Runner> = plan.threads.iter().copied().map(Runner::pipeline).collect();
     let mut collisions = vec![0; frames as usize];
     let mut times = vec![Vec::with_capacity(frames as usize * rounds); runners.len()];
@@ -104,7 +106,7 @@ impl Frames {
         let (calmest, fewest) = counts().min_by_key(|&(_, count)| count).unwrap_or((0, &0));
         Chart {
             name: "fig15-collisions",
-            title: format!("Collisions of each frame, {} objects", self.outcome.race.scene.objects),
+            title: format!("Collisions of each frame, {} objects", self.outcome.race.subject.objects()),
             x_label: "frame",
             y_label: "collisions",
             finding: format!("The most are {most}, in frame {busiest}; the fewest {fewest}, in frame {calmest}."),

@@ -2,6 +2,7 @@
 
 use crate::executor::MAX_THREADS;
 use crate::pool::cores;
+use crate::scene::craniotomy::OBJECTS;
 
 /// The sizes of one experiment.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -22,12 +23,40 @@ impl Sweep {
     }
 }
 
+/// The sizes of automated retraction.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Retraction {
+    /// Numbers of threads, from 1 upwards.
+    pub threads: Vec<usize>,
+    /// Whether they leave a core to haptics.
+    pub keeps_core: bool,
+    /// Frames of each run that are timed.
+    pub frames: u64,
+    /// Rounds of each race.
+    pub rounds: usize,
+}
+
+impl Retraction {
+    /// On so many cores, of which one is kept for haptics if there are more than two, as in the paper
+    /// (Fig. 18).
+    fn on(cores: usize, frames: u64, rounds: usize) -> Self {
+        let keeps_core = cores > 2;
+        let most = cores - usize::from(keeps_core);
+        Self { threads: (1..=most.min(MAX_THREADS)).collect(), keeps_core, frames, rounds }
+    }
+
+    /// Objects updated, over all runs of so many runners that warm up for so many frames.
+    pub(super) fn work(&self, runners: usize, warm_up: u64) -> u64 {
+        (OBJECTS * runners * self.rounds) as u64 * (self.frames + warm_up)
+    }
+}
+
 /// The sizes of all experiments.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
     /// What velocities and substeps are drawn from.
     pub seed: u64,
-    /// Numbers of threads, from 1 upwards.
+    /// Numbers of threads, from 1 upwards, for all but Fig. 18.
     pub threads: Vec<usize>,
     /// Figs. 11–13.
     pub scalability: Sweep,
@@ -37,6 +66,8 @@ pub struct Plan {
     pub per_frame: Sweep,
     /// Figs. 16 and 17: a light and a heavy load.
     pub compare: Sweep,
+    /// Fig. 18.
+    pub retraction: Retraction,
 }
 
 impl Plan {
@@ -51,6 +82,7 @@ impl Plan {
             load_balance: Sweep { objects: hundreds, frames: 800, rounds: 1 },
             per_frame: Sweep { objects: vec![300], frames: 600, rounds: 15 },
             compare: Sweep { objects: vec![100, 1_000], frames: 400, rounds: 15 },
+            retraction: Retraction::on(cores(), 1_000, 7),
         }
     }
 
@@ -62,6 +94,7 @@ impl Plan {
             load_balance: Sweep { objects: vec![100, 500, 1_000], frames: 200, rounds: 1 },
             per_frame: Sweep { objects: vec![300], frames: 600, rounds: 5 },
             compare: Sweep { objects: vec![100, 1_000], frames: 100, rounds: 5 },
+            retraction: Retraction::on(cores(), 100, 3),
             ..Self::full()
         }
     }
@@ -70,5 +103,22 @@ impl Plan {
     #[must_use]
     pub fn most_threads(&self) -> usize {
         self.threads.iter().copied().max().unwrap_or(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_core_for_haptics() {
+        for (cores, threads, keeps_core) in
+            [(1, 1, false), (2, 2, false), (3, 2, true), (6, 5, true)]
+        {
+            let plan = Retraction::on(cores, 10, 1);
+            assert_eq!(plan.threads, (1..=threads).collect::<Vec<_>>(), "{cores} cores");
+            assert_eq!(plan.keeps_core, keeps_core, "{cores} cores");
+        }
+        assert_eq!(Retraction::on(2 * MAX_THREADS, 10, 1).threads.len(), MAX_THREADS);
     }
 }

@@ -10,10 +10,10 @@ use super::calibrator::Phase;
 use super::error::ExperimentError;
 use super::load::RenderLoad;
 use super::outcome::Outcome;
+use super::subject::Subject;
 use super::timing::{Contender, Series};
 use crate::executor::{ExecutorKind, FrameRecord};
-use crate::manager::{Settings, VeManager};
-use crate::scene::ParticleScene;
+use crate::manager::VeManager;
 
 /// Frames before the clock starts; usually 16: shorter runs are mostly cold start.
 pub const WARM_UP: u64 = 16;
@@ -50,21 +50,17 @@ impl Runner {
         format!("{} × {}", self.executor.name(), self.threads)
     }
 
-    pub(super) fn settings(self) -> Settings {
-        Settings { executor: self.executor, threads: self.threads, ..Settings::default() }
-    }
-
     /// Whether its threads may go on spinning after a run. The pipeline's have ended by then.
     fn spins(self) -> bool {
         !matches!(self.executor, ExecutorKind::Serial | ExecutorKind::Pipeline)
     }
 }
 
-/// An environment, and how long it runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What is run, and for how long.
+#[derive(Clone, Debug)]
 pub struct Race {
-    /// The environment.
-    pub scene: ParticleScene,
+    /// The environment, and what is done in it.
+    pub subject: Subject,
     /// What rendering costs.
     pub load: RenderLoad,
     /// Frames before the clock starts; usually [`WARM_UP`].
@@ -77,9 +73,8 @@ pub struct Race {
 
 impl fmt::Display for Race {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { scene, load, frames, .. } = self;
-        write!(f, "{} objects, seed {}, ", scene.objects, scene.seed)?;
-        write!(f, "render {}, {frames} frames", load.name())
+        let Self { subject, load, frames, .. } = self;
+        write!(f, "{subject}, render {}, {frames} frames", load.name())
     }
 }
 
@@ -125,7 +120,7 @@ impl Race {
             runners.iter().enumerate().map(contender).collect();
         let series = Series::measure(&mut contenders, self.rounds, phase, done)?;
         drop(contenders);
-        Ok(Outcome { race: *self, runners: runners.to_vec(), series })
+        Ok(Outcome { race: self.clone(), runners: runners.to_vec(), series })
     }
 
     /// Seconds of one run.
@@ -162,17 +157,17 @@ impl Race {
         expected: &Cell<Option<u64>>,
         on_frame: &mut dyn FnMut(&FrameRecord, Duration),
     ) -> Result<f64, ExperimentError> {
-        let mut manager = VeManager::new(self.scene.build()?, runner.settings())?;
+        let mut session = self.subject.start(runner)?;
         let mut renderer = self.load.renderer();
-        manager.run(self.warm_up, &mut *renderer, &mut |_| ())?;
+        session.run(self.warm_up, &mut *renderer, &mut |_| ())?;
         let began = Instant::now();
         let mut last = began;
-        manager.run(self.frames, &mut *renderer, &mut |record| {
+        session.run(self.frames, &mut *renderer, &mut |record| {
             on_frame(record, record.swapped - last);
             last = record.swapped;
         })?;
         let seconds = began.elapsed().as_secs_f64();
-        check(&manager, runner, expected)?;
+        check(&session.manager, runner, expected)?;
         Ok(seconds)
     }
 }
@@ -200,13 +195,14 @@ fn check(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::ParticleScene;
 
     const GOOD: Phase = Phase { gain: 2.0, ping_pong: 100.0 };
 
     #[test]
     fn every_runner_runs_every_round() {
-        let scene = ParticleScene::new(4);
-        let race = Race { scene, load: RenderLoad::Null, warm_up: 2, frames: 3, rounds: 2 };
+        let subject = Subject::Particles(ParticleScene::new(4));
+        let race = Race { subject, load: RenderLoad::Null, warm_up: 2, frames: 3, rounds: 2 };
         let runners: Vec<Runner> =
             std::iter::once(Runner::SERIAL).chain(Runner::parallel(2)).collect();
         let mut runs = 0;
@@ -223,8 +219,8 @@ mod tests {
 
     #[test]
     fn another_state_is_an_error() {
-        let scene = ParticleScene::new(2);
-        let race = Race { scene, load: RenderLoad::Null, warm_up: 0, frames: 1, rounds: 1 };
+        let subject = Subject::Particles(ParticleScene::new(2));
+        let race = Race { subject, load: RenderLoad::Null, warm_up: 0, frames: 1, rounds: 1 };
         let other = Cell::new(Some(0));
         let error = race.once(Runner::SERIAL, &other, &mut |_, _| ()).err();
         assert!(matches!(error, Some(ExperimentError::Differs { expected: 0, .. })), "{error:?}");

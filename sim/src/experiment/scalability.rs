@@ -6,6 +6,7 @@ use super::load::RenderLoad;
 use super::outcome::{Outcome, marked};
 use super::race::{Race, Runner, WARM_UP};
 use super::speedup::efficiency;
+use super::subject::Subject;
 use super::{Laboratory, Report};
 use crate::scene::ParticleScene;
 
@@ -19,7 +20,8 @@ pub(super) fn run(laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentE
     for &objects in &sweep.objects {
         let scene = ParticleScene { seed: plan.seed, ..ParticleScene::new(objects) };
         let (frames, rounds) = (sweep.frames, sweep.rounds);
-        let race = Race { scene, load: RenderLoad::Null, warm_up: WARM_UP, frames, rounds };
+        let subject = Subject::Particles(scene);
+        let race = Race { subject, load: RenderLoad::Null, warm_up: WARM_UP, frames, rounds };
         outcomes.push(laboratory.race(race, &runners)?);
     }
     let mut rounds = Outcome::rounds_table("scalability-rounds");
@@ -56,7 +58,7 @@ fn throughput(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Experim
     let reached = |outcome: Option<&Outcome>| {
         let outcome = outcome?;
         let fps = throughput(Runner::pipeline(most))(outcome)?;
-        Some(format!("{fps:.0} frames per second with {} objects", outcome.race.scene.objects))
+        Some(format!("{fps:.0} frames per second with {} objects", outcome.race.subject.objects()))
     };
     let ends = [reached(outcomes.first()), reached(outcomes.last())];
     let ends: Vec<String> = ends.into_iter().flatten().collect();
@@ -78,7 +80,7 @@ fn speed_ups(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Experime
         label: format!("ideal {count}"),
         points: outcomes
             .iter()
-            .map(|outcome| (outcome.race.scene.objects as f64, count as f64))
+            .map(|outcome| (outcome.race.subject.objects() as f64, count as f64))
             .collect(),
         dashed: true,
         color,
@@ -142,7 +144,7 @@ fn speed_up(threads: usize) -> impl Fn(&Outcome) -> Option<f64> + Copy {
 
 /// A line over the numbers of objects.
 fn line(label: &str, outcomes: &[Outcome], value: impl Fn(&Outcome) -> Option<f64>) -> Line {
-    let point = |outcome: &Outcome| Some((outcome.race.scene.objects as f64, value(outcome)?));
+    let point = |outcome: &Outcome| Some((outcome.race.subject.objects() as f64, value(outcome)?));
     let points = outcomes.iter().filter_map(point).collect();
     Line { label: label.to_owned(), points, ..Line::default() }
 }

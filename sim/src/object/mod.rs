@@ -138,7 +138,8 @@ impl Object {
 
     /// What an update takes, in seconds, as its share of its block's last ones that were timed; 0 before
     /// the first.
-    pub(crate) fn cost(&self) -> f32 {
+    #[must_use]
+    pub fn cost(&self) -> f32 {
         self.cost
     }
 

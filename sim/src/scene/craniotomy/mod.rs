@@ -32,6 +32,8 @@ pub const TOOLS: [ObjectId; 2] = [ObjectId(0), ObjectId(1)];
 pub const FIRST_STRUCTURE: ObjectId = ObjectId(2);
 /// The skull.
 pub const SKULL: ObjectId = ObjectId(2 + Head::STRUCTURES as u32);
+/// The number of objects at the start.
+pub const OBJECTS: usize = SKULL.0 as usize + 1;
 /// The group of tools.
 const TOOL_GROUP: Group = Group(0);
 /// The group of the skull.
