@@ -138,5 +138,5 @@ fn save(patient: &Patient, manager: &VeManager, path: &Path) -> Result<(), RunEr
     let Some(skull) = skull else { return Ok(()) };
     let pieces: Vec<&Volume> = pieces.iter().collect();
     let after = patient.head.drilled(&skull, &pieces)?;
-    Ok(image::save(path, after.grid(), after.voxels())?)
+    image::save(path, after.grid(), after.voxels()).map_err(RunError::Image)
 }

@@ -55,8 +55,9 @@ pub(super) enum RunError {
     Operation(#[from] BuildError),
     #[error("the image cannot be brought up to date")]
     Drilled(#[from] HeadError),
-    #[error(transparent)]
-    Image(#[from] FileError),
+    // It says all that it comes from.
+    #[error("{0}")]
+    Image(FileError),
 }
 
 /// The environment that `args` describe, with another number of particles.

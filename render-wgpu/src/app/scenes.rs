@@ -107,8 +107,9 @@ pub(super) struct PatientSpec {
 /// Why there is no patient.
 #[derive(Debug, Error)]
 pub(super) enum PatientError {
-    #[error(transparent)]
-    File(#[from] FileError),
+    // It says all that it comes from.
+    #[error("{0}")]
+    File(FileError),
     #[error("no head can be made of {file}")]
     Head {
         file: String,
@@ -131,7 +132,7 @@ impl Patient {
             return Ok(Self { head, spec: PatientSpec { ct: None } });
         };
         let file = path.to_string_lossy().into_owned();
-        let image = Image::open(path)?;
+        let image = Image::open(path).map_err(PatientError::File)?;
         let digest = digest(&image);
         let head = named(&file, Head::from_ct(image, &Thresholds::default()))?;
         Ok(Self { head, spec: PatientSpec { ct: Some((file, digest)) } })

@@ -156,7 +156,7 @@ mod tests {
         for swapped in 0..script.frames() {
             let mailbox = Mailbox::new();
             script.post(swapped, &mailbox);
-            mailbox.take(|to, message| {
+            mailbox.take(swapped + AHEAD, |to: ObjectId, message| {
                 let switch = matches!(message, Message::TakeUp(_));
                 told.push((swapped + AHEAD, to.0, switch));
             });

@@ -38,18 +38,18 @@ const AWAY: f32 = 0.04;
 /// How high the bone flap is lifted, in metres; usually 40 mm, and how fast.
 const LIFTED: f32 = 0.04;
 
-/// A part of the operation, or all of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// How far the operation goes; each step follows those before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Step {
     /// The scalp is cut.
     Incision,
-    /// The scalp is cut, scraped off and drawn aside.
+    /// The scalp is scraped off the bone and drawn aside.
     Retraction,
     /// A burr hole is drilled.
     BurrHole,
-    /// A burr hole is drilled, and from there a bone flap is cut out and lifted.
+    /// From the burr hole on a bone flap is cut out, and it is lifted.
     Flap,
-    /// All of them.
+    /// To the end: up to now the same as [`Step::Flap`].
     All,
 }
 
@@ -75,17 +75,15 @@ impl Step {
 pub(super) fn script(head: &Head, step: Step) -> Script {
     let mut script = Script::new(TOOLS, TIME_STEP);
     rest(&mut script, &head.plan);
-    if matches!(step, Step::Incision | Step::Retraction | Step::All) {
-        incise(&mut script, &head.plan);
-    }
-    if matches!(step, Step::Retraction | Step::All) {
+    incise(&mut script, &head.plan);
+    if step >= Step::Retraction {
         retract(&mut script, head);
     }
-    if matches!(step, Step::BurrHole | Step::Flap | Step::All) {
-        drill(&mut script, &head.plan.burr_hole);
+    if step >= Step::BurrHole {
+        drill(&mut script, &head.plan);
     }
-    if matches!(step, Step::Flap | Step::All) {
-        saw(&mut script, &head.plan.craniotomy);
+    if step >= Step::Flap {
+        saw(&mut script, &head.plan);
         lift(&mut script, &head.plan.middle);
     }
     script
@@ -96,13 +94,19 @@ fn free(instrument: Instrument, axis: Vec3, path: Vec<Vec3>) -> Stroke {
     Stroke { instrument, axis, path, speed: FREELY, pressed: false }
 }
 
+/// Where a hand rests.
+fn aside(plan: &Plan, hand: usize) -> Vec3 {
+    let outward = -plan.middle.inward;
+    let side = if hand == RIGHT { 1.0 } else { -1.0 };
+    let aside = outward.cross(Vec3::Z).normalize_or(Vec3::X) * (side * 2.0 * AWAY);
+    plan.middle.point + outward * (2.0 * AWAY) + aside
+}
+
 /// Both hands rest away from the head.
 fn rest(script: &mut Script, plan: &Plan) {
-    let outward = -plan.middle.inward;
-    let aside = outward.cross(Vec3::Z).normalize_or(Vec3::X) * AWAY;
-    for (hand, aside) in [(RIGHT, aside), (LEFT, -aside)] {
-        let place = plan.middle.point + outward * (2.0 * AWAY) + aside;
-        script.stroke(hand, &free(Instrument::Forceps, outward, vec![place]));
+    for hand in [RIGHT, LEFT] {
+        let place = vec![aside(plan, hand)];
+        script.stroke(hand, &free(Instrument::Forceps, -plan.middle.inward, place));
     }
     script.meet();
 }
@@ -122,7 +126,8 @@ fn incise(script: &mut Script, plan: &Plan) {
             Stroke { instrument: Instrument::Scalpel, axis, path, speed: CUTTING, pressed: true };
         script.stroke(RIGHT, &cut);
     }
-    script.stroke(RIGHT, &free(Instrument::Scalpel, end, vec![stop, last + end * AWAY]));
+    let away = vec![stop, last + end * AWAY, aside(plan, RIGHT)];
+    script.stroke(RIGHT, &free(Instrument::Scalpel, end, away));
     // The wound gapes.
     script.wait(RIGHT, 60);
     script.meet();
@@ -177,8 +182,8 @@ fn draw(script: &mut Script, hand: usize, instrument: Instrument, pull: &Pull) {
     script.stroke(hand, &Stroke { instrument, axis, path, speed: DRAWING, pressed: true });
 }
 
-fn drill(script: &mut Script, entry: &Entry) {
-    let Entry { point, inward, thickness } = *entry;
+fn drill(script: &mut Script, plan: &Plan) {
+    let Entry { point, inward, thickness } = plan.burr_hole;
     let axis = -inward;
     let instrument = Instrument::Perforator;
     let above = point + axis * AWAY;
@@ -186,12 +191,13 @@ fn drill(script: &mut Script, entry: &Entry) {
     let path = vec![point, point + inward * (thickness + LEANING)];
     script.stroke(RIGHT, &Stroke { instrument, axis, path, speed: FREELY, pressed: true });
     script.wait(RIGHT, LEANING_FRAMES);
-    script.stroke(RIGHT, &free(instrument, axis, vec![point, above]));
+    script.stroke(RIGHT, &free(instrument, axis, vec![point, above, aside(plan, RIGHT)]));
     script.meet();
 }
 
 /// Leads a craniotome from the burr hole once around.
-fn saw(script: &mut Script, outline: &[Entry]) {
+fn saw(script: &mut Script, plan: &Plan) {
+    let outline = &plan.craniotomy;
     let Some(first) = outline.first() else { return };
     let tip = |entry: &Entry| entry.point + entry.inward * (entry.thickness + BEYOND);
     let instrument = Instrument::Craniotome;
@@ -206,7 +212,10 @@ fn saw(script: &mut Script, outline: &[Entry]) {
     }
     // The bit is behind the hand by as much as it takes to press it on.
     script.wait(RIGHT, 120);
-    script.stroke(RIGHT, &free(instrument, -first.inward, vec![tip(first), above]));
+    script.stroke(
+        RIGHT,
+        &free(instrument, -first.inward, vec![tip(first), above, aside(plan, RIGHT)]),
+    );
     script.meet();
 }
 
