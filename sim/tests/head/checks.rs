@@ -7,7 +7,7 @@ use dualframe_sim::scene::head::{Entry, Form, Head, Hold, Layer, Structure};
 use glam::Vec3;
 
 /// Checks structures, attachments and plan.
-pub fn check(head: &Head) {
+pub(crate) fn check(head: &Head) {
     assert_eq!(head.structures.len(), Head::STRUCTURES);
     let mut names: Vec<&str> = head.structures.iter().map(|structure| structure.name).collect();
     names.sort_unstable();
