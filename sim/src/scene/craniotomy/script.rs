@@ -166,7 +166,10 @@ mod tests {
         assert_eq!(switches, [(2, 0), (2, 1), (8, 0)]);
         let places: Vec<_> =
             told.iter().filter(|told| !told.2).map(|told| (told.0, told.1)).collect();
-        // 5 points, rest until the switch, whose first place is also the last one's, then 4 more.
-        assert_eq!(places, [(2, 0), (2, 1), (3, 0), (4, 0), (9, 0), (10, 0), (11, 0), (12, 0)]);
+        // 5 points, rest until the switch, then 5 again.
+        assert_eq!(
+            places,
+            [(2, 0), (2, 1), (3, 0), (4, 0), (8, 0), (9, 0), (10, 0), (11, 0), (12, 0)]
+        );
     }
 }
