@@ -64,11 +64,6 @@ impl Theatre {
         self
     }
 
-    fn whole(self) -> Self {
-        let frames = self.operation.frames();
-        self.run(frames)
-    }
-
     fn read<T>(&self, id: ObjectId, mut read: impl FnMut(&Object) -> T) -> T {
         let mut found = None;
         self.manager.visit(&mut |object| {
@@ -125,13 +120,24 @@ fn thirty_objects() {
     }
 }
 
-/// Along the middle half of the incision the edges part by at least 1.5 mm by themselves; the scalp's mass
-/// stays what it was.
+/// From the incision to the lifted flap, in one run: each step's script is the beginning of the next one's.
 #[test]
-fn an_incision_gapes() {
-    let theatre = Theatre::new(Step::Incision, ExecutorKind::Pipeline, 2);
+fn an_operation() {
+    let frames = |step| Operation::new(head(), Some(step)).frames();
+    let theatre = Theatre::new(Step::Flap, ExecutorKind::Pipeline, 2);
     let before = theatre.read(SCALP, mass);
-    let theatre = theatre.whole();
+    let theatre = theatre.run(frames(Step::Incision));
+    the_incision_gapes(&theatre, before);
+    let theatre = theatre.run(frames(Step::Retraction));
+    the_bone_is_bare(&theatre);
+    let theatre = theatre.run(frames(Step::BurrHole));
+    the_burr_hole_is_through(&theatre);
+    let end = frames(Step::All);
+    the_flap_is_lifted(&theatre.run(end));
+}
+
+/// The edges part by at least 1.5 mm by themselves; the scalp's mass stays what it was.
+fn the_incision_gapes(theatre: &Theatre, before: f64) {
     let after = theatre.read(SCALP, mass);
     assert!((after / before - 1.0).abs() < 1e-5, "{before} kg became {after} kg");
     let gaps = theatre.read(SCALP, gaps);
@@ -140,48 +146,42 @@ fn an_incision_gapes() {
     assert!(half > 0.001_5, "half of the edges are less than {half} m apart: {gaps:?}");
 }
 
-/// Drawn aside, the flap leaves a wound at least 15 mm wide.
-#[test]
-fn a_retracted_flap_leaves_the_bone_bare() {
-    let theatre = Theatre::new(Step::Retraction, ExecutorKind::Pipeline, 2).whole();
+/// Drawn aside, the flap leaves a wound at least 15 mm wide, and both tools hold scalp.
+fn the_bone_is_bare(theatre: &Theatre) {
     let gaps = theatre.read(SCALP, gaps);
     assert!(gaps[0] > 0.015, "the widest gap is {} m", gaps[0]);
-    let held = TOOLS.map(|tool| {
-        theatre.read(SCALP, |scalp| Tissue::of(scalp).expect("tissue").held_nodes(tool))
-    });
+    let held =
+        |tool| theatre.read(SCALP, |scalp| Tissue::of(scalp).expect("tissue").held_nodes(tool));
+    let held = TOOLS.map(held);
     assert!(held.iter().all(|&nodes| nodes > 0), "the tools hold {held:?} nodes");
 }
 
-/// From the burr hole to the lifted flap: the perforator stops by itself within 1 mm of the inner table,
-/// the flap comes free once, as an object of its own, and no bone is lost or made on the way.
-#[test]
-fn a_bone_flap_is_cut_out_and_lifted() {
-    let head = head();
-    let entry = head.plan.burr_hole;
-    let theatre = Theatre::new(Step::Flap, ExecutorKind::Pipeline, 2);
-    let drilled = Theatre::new(Step::BurrHole, ExecutorKind::Pipeline, 2).whole();
-    let plunge = drilled.operation.report().plunge;
+/// The perforator stopped by itself within 1 mm of the inner table, and the hole is through.
+fn the_burr_hole_is_through(theatre: &Theatre) {
+    let entry = head().plan.burr_hole;
+    let plunge = theatre.operation.report().plunge;
     assert!(plunge < 0.001, "the perforator came {plunge} m past the inner table");
-    let open = drilled.read(SKULL, |skull| {
+    let open = theatre.read(SKULL, |skull| {
         let volume = skull.geometry.as_volume().expect("bone");
         let depths = (0..=14).map(|step| step as f32 * 0.5e-3);
         let along = depths.filter(|&depth| depth < entry.thickness);
         along.map(|depth| volume.density_at(entry.point + entry.inward * depth)).fold(0.0, f32::max)
     });
     assert!(open < 0.5, "there is still bone of density {open} in the hole");
-    let turned = drilled.read(TOOLS[0], |tool| Tool::of(tool).expect("a tool").work().turns);
-    assert!(!turned && drilled.freed.is_empty());
+    let turns = theatre.read(TOOLS[0], |tool| Tool::of(tool).expect("a tool").work().turns);
+    assert!(!turns && theatre.freed.is_empty());
+}
 
-    let theatre = theatre.whole();
+/// The flap came free once, as an object of its own, and no bone was lost or made on the way.
+fn the_flap_is_lifted(theatre: &Theatre) {
+    let head = head();
     assert_eq!(theatre.freed.len(), 1, "freed before frames {:?}", theatre.freed);
-    let place = head.plan.middle.point;
     let lifted = theatre.read(PIECE, |piece| {
         let behavior: &dyn Any = &*piece.behavior;
         assert!(!behavior.downcast_ref::<Piece>().expect("a piece").is_seated());
-        (piece.center() - place).dot(-head.plan.middle.inward)
+        (piece.center() - head.plan.middle.point).dot(-head.plan.middle.inward)
     });
     assert!(lifted > 0.02, "the flap is {lifted} m above its place");
-    // Voxels: what there was is what is left, what is in the flap and what was drilled away.
     let full = |id: ObjectId| {
         theatre.read(id, |object| {
             let densities = object.geometry.as_volume().expect("bone").densities();

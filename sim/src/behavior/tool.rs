@@ -35,8 +35,8 @@ const BURR_SPIN: f32 = 3_140.0;
 const CRANIOTOME_SPIN: f32 = 6_280.0;
 /// How strongly a hand pushes a burr or a craniotome, in newtons; usually 10.
 const PUSH: f32 = 10.0;
-/// How strongly a hand leans on a perforator, in newtons; usually 30.
-const LEAN: f32 = 30.0;
+/// What slows a hand on a perforator, in newton seconds per metre; usually 3,000: its wide bit is stiff.
+const LEANING_RESISTANCE: f32 = 3_000.0;
 /// How far a drill goes in bone in a frame at most, in metres; usually half a voxel of 0.5 mm.
 const BONE_STEP: f32 = 2.5e-4;
 /// How far a drill goes outside bone in a frame at most, in metres; usually 1.2 mm, the least radius of a
@@ -82,6 +82,7 @@ pub struct Tool {
     /// Where the edge was in the frame before, if it was this instrument's.
     before: Option<Blade>,
     holds: bool,
+    /// Of the hand on a burr or a craniotome, and on a perforator.
     feeds: [Feed; 2],
     perforator: Perforator,
     reaction: Reaction,
@@ -102,9 +103,10 @@ impl Tool {
         let shapes = Instrument::ALL.map(shape);
         let pose = Pose::from_parts(device.position, device.orientation);
         let rigid = Rigid::new(shapes[instrument as usize].clone(), pose);
-        let feed = |strength| Feed::new(strength, Feed::RESISTANCE, FREE_STEP, BONE_STEP);
-        let feeds = [PUSH, LEAN].map(|strength| {
-            feed(strength).unwrap_or_else(|_| unreachable!("the constants are positive"))
+        let hands = [(PUSH, Feed::RESISTANCE), (Perforator::PUSH, LEANING_RESISTANCE)];
+        let feeds = hands.map(|(strength, resistance)| {
+            let feed = Feed::new(strength, resistance, FREE_STEP, BONE_STEP);
+            feed.unwrap_or_else(|_| unreachable!("the constants are positive"))
         });
         let tool = Self {
             instrument,
@@ -166,12 +168,15 @@ impl Tool {
     /// Where the tip goes in this frame.
     fn next(&self, tip: Vec3, time: f32) -> Vec3 {
         let wanted = self.device.position;
+        self.feed().map_or(wanted, |feed| feed.next(tip, wanted, &self.reaction, time))
+    }
+
+    /// How the hand leads an instrument that drills.
+    fn feed(&self) -> Option<&Feed> {
         match self.instrument {
-            Instrument::Perforator => self.feeds[1].next(tip, wanted, &self.reaction, time),
-            Instrument::Burr | Instrument::Craniotome => {
-                self.feeds[0].next(tip, wanted, &self.reaction, time)
-            }
-            _ => wanted,
+            Instrument::Perforator => Some(&self.feeds[1]),
+            Instrument::Burr | Instrument::Craniotome => Some(&self.feeds[0]),
+            _ => None,
         }
     }
 
@@ -253,7 +258,7 @@ impl Tool {
             .filter(|&other| input.contacts().any(|contact| contact.other == other))
             .collect();
         if let Some(burr) = self.burr(geometry).filter(|burr| burr.spin != 0.0) {
-            let load = reaction.load();
+            let load = self.feed().map_or(0.0, |feed| feed.load(&reaction));
             for bone in drilled {
                 input.post(bone, Message::Custom(Box::new(Erode { burr, load })));
             }
