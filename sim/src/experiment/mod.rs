@@ -80,7 +80,7 @@ impl Experiment {
         }
     }
 
-    /// How much work it is, in objects updated.
+    /// How much work it is, in particles updated.
     #[must_use]
     pub fn work(self, plan: &Plan) -> u64 {
         let threads = plan.threads.len();
@@ -174,7 +174,7 @@ impl Laboratory<'_> {
         runners: &[Runner],
         on_frame: &mut OnFrame<'_>,
     ) -> Result<Outcome, ExperimentError> {
-        let work = race.subject.objects() as u64 * (race.warm_up + race.frames);
+        let work = race.subject.work() * (race.warm_up + race.frames);
         let calibrator = self.calibrator;
         let mut phase = || calibrator.phase();
         let mut done = || self.advance(work);

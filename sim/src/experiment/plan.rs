@@ -1,8 +1,8 @@
 //! How large an experiment is.
 
+use super::subject::RETRACTION_WORK;
 use crate::executor::MAX_THREADS;
 use crate::pool::cores;
-use crate::scene::craniotomy::OBJECTS;
 
 /// The sizes of one experiment.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,9 +45,9 @@ impl Retraction {
         Self { threads: (1..=most.min(MAX_THREADS)).collect(), keeps_core, frames, rounds }
     }
 
-    /// Objects updated, over all runs of so many runners that warm up for so many frames.
+    /// In particles updated, over all runs of so many runners that warm up for so many frames.
     pub(super) fn work(&self, runners: usize, warm_up: u64) -> u64 {
-        (OBJECTS * runners * self.rounds) as u64 * (self.frames + warm_up)
+        (runners * self.rounds) as u64 * (self.frames + warm_up) * RETRACTION_WORK
     }
 }
 

@@ -13,6 +13,9 @@ use crate::scene::ParticleScene;
 use crate::scene::craniotomy::{self, Operation, Step};
 use crate::scene::head::Head;
 
+/// What a frame of a retraction takes, in particles updated: 5 ms of 3 µs each, roughly.
+pub(super) const RETRACTION_WORK: u64 = 1_500;
+
 /// An environment, and what is done in it.
 #[derive(Clone, Debug)]
 pub enum Subject {
@@ -38,6 +41,14 @@ impl Subject {
         match self {
             Self::Particles(scene) => scene.objects,
             Self::Retraction(_) => craniotomy::OBJECTS,
+        }
+    }
+
+    /// What a frame takes, in particles updated.
+    pub(super) fn work(&self) -> u64 {
+        match self {
+            Self::Particles(scene) => scene.objects as u64,
+            Self::Retraction(_) => RETRACTION_WORK,
         }
     }
 
