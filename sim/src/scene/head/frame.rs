@@ -43,8 +43,10 @@ impl Frame {
     }
 
     /// The voxel, with fractions, whose middle is at a place.
+    #[inline]
     pub(super) fn voxel(&self, point: Vec3) -> [f32; 3] {
-        self.rows.map(|[x, y, z, origin]| x * point.x + y * point.y + z * point.z + origin)
+        let along = |[x, y, z, origin]: [f32; 4]| x * point.x + y * point.y + z * point.z + origin;
+        [along(self.rows[0]), along(self.rows[1]), along(self.rows[2])]
     }
 
     /// A place in the world along the patient's axes.
@@ -71,30 +73,37 @@ pub(super) struct Field<'a, T> {
 
 impl<T: Copy + Into<f32>> Field<'_, T> {
     /// The number at a place, trilinear between the voxels' middles.
+    ///
+    /// Written out: closures over arrays took three quarters of a head's time in builds of tests.
     pub(super) fn at(&self, point: Vec3) -> f32 {
-        let at = self.frame.voxel(point);
-        let low = at.map(f32::floor);
-        let share = [0, 1, 2].map(|axis| at[axis] - low[axis]);
-        let [x, y, z] = low.map(|value| value as i32);
-        let row = |dy, dz| {
-            let [from, to] = [0, 1].map(|dx| self.get([x + dx, y + dy, z + dz]));
-            between(from, to, share[0])
-        };
-        let slice = |dz| between(row(0, dz), row(1, dz), share[1]);
-        between(slice(0), slice(1), share[2])
+        let [x, y, z] = self.frame.voxel(point);
+        let (low_x, low_y, low_z) = (x.floor(), y.floor(), z.floor());
+        let (i, j, k) = (low_x as i32, low_y as i32, low_z as i32);
+        let share = [x - low_x, y - low_y, z - low_z];
+        let near = between(self.row(i, j, k, share[0]), self.row(i, j + 1, k, share[0]), share[1]);
+        let k = k + 1;
+        let far = between(self.row(i, j, k, share[0]), self.row(i, j + 1, k, share[0]), share[1]);
+        between(near, far, share[2])
     }
 
-    fn get(&self, voxel: [i32; 3]) -> f32 {
-        let inside = (0..3).all(|axis| (voxel[axis] as u32) < self.dims[axis]);
-        if !inside {
+    /// The number between two voxels of a row.
+    #[inline]
+    fn row(&self, i: i32, j: i32, k: i32, share: f32) -> f32 {
+        between(self.get(i, j, k), self.get(i + 1, j, k), share)
+    }
+
+    #[inline]
+    fn get(&self, i: i32, j: i32, k: i32) -> f32 {
+        let [wide, high, deep] = self.dims;
+        // As unsigned numbers, negative ones are too great.
+        if i as u32 >= wide || j as u32 >= high || k as u32 >= deep {
             return self.outside.into();
         }
-        let [x, y, z] = voxel.map(|index| index as usize);
-        let [wide, high, _] = self.dims.map(|side| side as usize);
-        self.voxels[(z * high + y) * wide + x].into()
+        self.voxels[(k as usize * high as usize + j as usize) * wide as usize + i as usize].into()
     }
 }
 
+#[inline]
 fn between(from: f32, to: f32, share: f32) -> f32 {
     from + (to - from) * share
 }
