@@ -2,7 +2,7 @@
 //!
 //! | room | what it does |
 //! |---|---|
-//! | `build` | the objects and the modelled interactions, from a [`Head`](super::head::Head) |
+//! | `build` | the objects and the modelled interactions, from a [`Head`] |
 //! | `script`, `steps` | what two hands do, step by step of the operation |
 //! | [`Operation`] | what the host does: it moves the hands, keeps the score and frees bone |
 //! | `freeing` | bone that a closed cut has freed becomes an object of its own |
