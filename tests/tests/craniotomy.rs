@@ -1,0 +1,66 @@
+//! `dualframe craniotomy`: what it reports, what it refuses, and that what it records comes back.
+#![forbid(unsafe_code)]
+
+use std::fs;
+
+use dualframe_sim::image::Image;
+use dualframe_sim::scene::head::synthetic_ct;
+use dualframe_tests::program::{read_json, run, told};
+
+#[test]
+fn an_operation_is_reported_recorded_and_saved() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
+    let (json, record, save) = (file("report.json"), file("session"), file("after.nii.gz"));
+    let args =
+        ["craniotomy", "--step", "incision", "--frames", "130", "--headless", "--threads", "2"];
+    let written = ["--json", &json, "--record", &record, "--save", &save];
+    let output = run(&[&args[..], &written].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report = read_json(json.as_ref());
+    assert_eq!((&report["scene"], &report["step"]), (&"craniotomy".into(), &"incision".into()));
+    assert_eq!((&report["objects"], &report["frames"]), (&30.into(), &130.into()));
+    assert_eq!((&report["pieces"], &report["bone_removed_mm3"]), (&0.into(), &0.0.into()));
+    assert!(report["score"]["seconds"].as_f64().is_some_and(|seconds| seconds > 2.0));
+    // Nothing was drilled.
+    let after = Image::open(save.as_ref()).expect("it was written");
+    let before = synthetic_ct().expect("it has no file");
+    assert!(after.voxels() == before.voxels());
+    for way in [["--threads", "1"], ["--executor", "static"]] {
+        let output = run(&[&["replay", &record, "--json", &json], &way[..]].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert_eq!(read_json(json.as_ref())["state_hash"], report["state_hash"], "{way:?}");
+    }
+}
+
+#[test]
+fn what_is_no_head_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("ct.nii");
+    let name = file.to_str().expect("a plain path");
+    let refused = |args: &[&str], expected: &str| {
+        let output = run(&[&["craniotomy"], args].concat());
+        told(&output, 2, expected);
+        assert!(output.stdout.is_empty());
+    };
+    refused(&["--ct", name], "No such file");
+    fs::write(&file, "no image, however long ".repeat(50)).expect("it can be written");
+    refused(&["--ct", name], "neither NIfTI-1 nor NRRD");
+    // A cube of water: no bone.
+    let mut water = vec![0_u8; 352];
+    water[..4].copy_from_slice(&348_i32.to_le_bytes());
+    for (place, value) in [(40, 3_i16), (42, 20), (44, 20), (46, 20), (70, 4), (72, 16)] {
+        water[place..place + 2].copy_from_slice(&value.to_le_bytes());
+    }
+    for (place, value) in [(80, 1.0_f32), (84, 1.0), (88, 1.0), (108, 352.0)] {
+        water[place..place + 4].copy_from_slice(&value.to_le_bytes());
+    }
+    water[123] = 2;
+    water[344..347].copy_from_slice(b"n+1");
+    water.extend([0; 2 * 20 * 20 * 20]);
+    fs::write(&file, water).expect("it can be written");
+    refused(&["--ct", name], "bone");
+    refused(&["--step", "nose"], "incision, retraction, burr-hole, flap, all");
+    refused(&["--save", "/no such folder/after.nii"], "cannot write");
+    refused(&["--frames", "0"], "0");
+}
