@@ -136,6 +136,31 @@ fn a_burr_drills_only_while_it_is_pressed() {
     assert!(OUTER.z - tip(&manager).z > 0.003);
 }
 
+/// A bit that turned does not turn on, or drill, as another instrument that is not pressed.
+#[test]
+fn a_switch_stops_the_bit() {
+    let (bone, workpieces) = bone();
+    let mut manager = manager(bone, OUTER + Vec3::Z * 0.005, workpieces);
+    let removed = |manager: &VeManager| {
+        read(manager, OTHER, |bone| {
+            let behavior: &dyn std::any::Any = &*bone.behavior;
+            behavior.downcast_ref::<Bone>().expect("bone").removed()
+        })
+    };
+    take_up(&manager, Instrument::Burr);
+    move_to(&manager, OUTER - Vec3::Z * 0.004, true);
+    run(&mut manager, 40);
+    let before = removed(&manager);
+    assert!(before > 0);
+    take_up(&manager, Instrument::Craniotome);
+    move_to(&manager, OUTER - Vec3::Z * 0.004, false);
+    // What was told before the switch is still done.
+    run(&mut manager, 1);
+    let told = removed(&manager);
+    run(&mut manager, 10);
+    assert_eq!(removed(&manager), told);
+}
+
 /// A square patch of tissue at z = 0, 60 mm a side, pinned along its border.
 fn patch() -> (Object, Workpieces) {
     const SIDE: u32 = 13;

@@ -85,8 +85,8 @@ pub struct Tool {
     /// Of the hand on a burr or a craniotome, and on a perforator.
     feeds: [Feed; 2],
     perforator: Perforator,
+    /// Of bone, in the frame before.
     reaction: Reaction,
-    side: Option<Vec3>,
     spin: f32,
     work: Work,
     shapes: [SharedShape; Instrument::ALL.len()],
@@ -117,7 +117,6 @@ impl Tool {
             feeds,
             perforator: Perforator::new(),
             reaction: Reaction::default(),
-            side: None,
             spin: 0.0,
             work: Work::default(),
             shapes,
@@ -253,18 +252,15 @@ impl Tool {
         let reaction = Reaction::new(on_bone, input.time_step);
         let on_tissue = input.contacts().filter(|contact| !is_bone(contact.other));
         let tissue = Reaction::new(on_tissue, input.time_step).force;
-        let touched = bone.iter().chain(pieces).copied();
-        let drilled: Vec<_> = touched
-            .filter(|&other| input.contacts().any(|contact| contact.other == other))
-            .collect();
         if let Some(burr) = self.burr(geometry).filter(|burr| burr.spin != 0.0) {
             let load = self.feed().map_or(0.0, |feed| feed.load(&reaction));
-            for bone in drilled {
-                input.post(bone, Message::Custom(Box::new(Erode { burr, load })));
+            for &bone in bone.iter().chain(pieces) {
+                if input.contacts().any(|contact| contact.other == bone) {
+                    input.post(bone, Message::Custom(Box::new(Erode { burr, load })));
+                }
             }
         }
         self.reaction = reaction;
-        self.side = reaction.normal();
         self.work = Work { bone: reaction.force, tissue, turns: self.spin != 0.0 };
     }
 }
@@ -296,6 +292,9 @@ impl Behavior for Tool {
                 self.instrument = instrument;
                 self.before = None;
                 self.perforator = Perforator::new();
+                // What the other instrument felt, and how its bit turned, is not this one's.
+                self.reaction = Reaction::default();
+                self.spin = 0.0;
             }
             _ => {}
         }
@@ -306,7 +305,7 @@ impl Behavior for Tool {
         let bit = self.bit()?;
         let axis = axis(pose.rotation);
         let center = pose.translation + axis * bit.radius;
-        Some(Burr { bit, center, axis, spin: self.spin, side: self.side })
+        Some(Burr { bit, center, axis, spin: self.spin, side: self.reaction.normal() })
     }
 
     fn hash_state(&self, hasher: &mut dyn Hasher) {
@@ -317,6 +316,12 @@ impl Behavior for Tool {
             hasher.write(&value.to_le_bytes());
         }
         hasher.write_u8(u8::from(self.holds));
+        let Reaction { force, elastic, tip } = self.reaction;
+        let edge = self.before.into_iter().flat_map(|blade| [blade.tip, blade.heel]);
+        for value in [force, elastic].into_iter().chain(edge).flat_map(|vector| vector.to_array()) {
+            hasher.write(&value.to_le_bytes());
+        }
+        hasher.write(&tip.to_le_bytes());
         hasher.write(&self.spin.to_le_bytes());
         self.perforator.hash_state(hasher);
     }

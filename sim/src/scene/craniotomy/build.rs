@@ -15,7 +15,7 @@ use crate::interaction::{
     NodesInBone, NodesInShape, PieceInBone, PieceOnBone, Response, RuleError, Rules,
 };
 use crate::message::Message;
-use crate::object::{Drawing, Group, Object, ObjectId, VisualProperties};
+use crate::object::{Group, Object, ObjectId, VisualProperties};
 use crate::scene::Scene;
 use crate::scene::head::{Form, Head, Hold, Layer, Structure};
 use crate::simd::Simd;
@@ -159,7 +159,6 @@ fn soft(number: usize, structure: &Structure) -> Result<Object, BuildError> {
     let (id, group) = (structure_id(number), structure_group(number));
     let mut object = Object::new(id, group, Geometry::Mesh(mesh), tissue);
     object.visual = VisualProperties { color: structure.color };
-    object.drawing = Drawing::Surface;
     Ok(object)
 }
 

@@ -35,7 +35,7 @@ const LEANING: f32 = 0.03;
 const LEANING_FRAMES: usize = 900;
 /// How far from the head a hand rests, in metres; usually 40 mm.
 const AWAY: f32 = 0.04;
-/// How high the bone flap is lifted, in metres; usually 40 mm, and how fast.
+/// How high the bone flap is lifted, in metres; usually 40 mm.
 const LIFTED: f32 = 0.04;
 
 /// How far the operation goes; each step follows those before it.
