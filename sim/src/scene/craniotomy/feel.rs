@@ -13,12 +13,12 @@ use crate::device::model::LocalModel;
 use crate::device::proxy::{ContactStiffness, Proxy};
 use crate::object::{Object, ObjectId};
 
-/// Swaps after that of a frame's own until a tool has gone where a device was then: none for the swap
-/// before, which is what bone is felt by.
+/// How many swaps before the last one the device was where a tool is in the frame that is drawn: what is
+/// posted at a swap moves it in the frame after the next.
 const MOVED: usize = 1;
-/// Until contacts find it there.
+/// Likewise where this frame's contacts found the tool.
 const TOUCHED: usize = 2;
-/// Until what it holds has been drawn there and has told.
+/// Likewise where the tool was when that which it holds was drawn there, which has told since.
 const HELD: usize = 3;
 /// The stiffness with which the dura is felt, in newtons per metre; usually 200, that of its contact.
 const DURA: f32 = 200.0;
@@ -28,8 +28,13 @@ const HOLD: f32 = 1_000.0;
 const DRAWN: f32 = 0.002;
 /// The force that it takes to cut scalp, in newtons; usually 1.
 const CUTTING: f32 = 1.0;
-/// How far a blade goes until it cuts on, in metres; usually 3 mm: that much skin gives way.
-const GIVES: f32 = 0.003;
+/// How far scalp gives way before a blade cuts on, in metres; usually 3 mm.
+const CUTTING_GIVES: f32 = 0.003;
+/// The coefficient of friction of an instrument on bone; usually 0.2.
+const FRICTION: f32 = 0.2;
+/// How far an instrument gives way on bone before it slides, in metres; usually 1 mm. Bone from a CT is
+/// uneven with a radius of some 10 mm: by friction divided by this its hold is stiffer than that is unstable.
+const FRICTION_GIVES: f32 = 0.001;
 
 /// Joins a haptic loop with a tool.
 ///
@@ -39,6 +44,8 @@ const GIVES: f32 = 0.003;
 #[derive(Debug)]
 pub(super) struct Feel<'c> {
     end: SimulationEnd<'c>,
+    /// The device at the first look in the frame that is being drawn.
+    now: Option<ToolState>,
     /// The device at the last swaps, the last one last.
     past: VecDeque<ToolState>,
     /// The tool as it was drawn last.
@@ -47,8 +54,8 @@ pub(super) struct Feel<'c> {
     proxies: Vec<(ObjectId, Proxy)>,
     /// Where the tool was when it took hold.
     grasp: Vec3,
-    /// Where the tissue is that a blade draws along.
-    edge: Option<Vec3>,
+    /// Of a blade in what it cuts, and of the tool on bone.
+    drags: [Drag; 2],
 }
 
 /// What was seen of a tool.
@@ -64,8 +71,8 @@ struct Seen {
 impl<'c> Feel<'c> {
     pub(super) fn new(end: SimulationEnd<'c>) -> Self {
         let past = VecDeque::with_capacity(HELD + 2);
-        let (tool, proxies, edge) = (None, Vec::new(), None);
-        Self { end, past, tool, proxies, grasp: Vec3::ZERO, edge }
+        let (now, tool, proxies, drags) = (None, None, Vec::new(), Default::default());
+        Self { end, now, past, tool, proxies, grasp: Vec3::ZERO, drags }
     }
 
     /// The device at the last swap; none as long as its loop said nothing.
@@ -88,7 +95,7 @@ impl<'c> Feel<'c> {
 
     /// The bone, or a piece of it, is this in the frame that is being drawn.
     pub(super) fn bone(&mut self, object: &Object) {
-        let (Some(volume), Some(&device)) = (object.geometry.as_volume(), self.device()) else {
+        let (Some(volume), Some(device)) = (object.geometry.as_volume(), self.look()) else {
             return;
         };
         let Some(Seen { tip, work, coupling, .. }) = self.tool else { return };
@@ -109,18 +116,17 @@ impl<'c> Feel<'c> {
 
     /// A frame is drawn: tells the loop what to exert.
     pub(super) fn deliver(&mut self) {
-        self.cut();
         if let Some(model) = self.model() {
             // A model that is no number is left out, and forces fade if none comes.
             let _ = self.end.deliver(model);
         }
+        self.now = None;
     }
 
     /// The frame was swapped: where the device is that the tool follows, from now on.
     pub(super) fn sample(&mut self) -> Option<DeviceSample> {
-        let now = self.end.tool();
-        let said = now.time > 0.0 && now.fault.is_none();
-        self.past.extend(if said { Some(now) } else { self.device().copied() });
+        let now = self.said().or(self.device().copied());
+        self.past.extend(now);
         if self.past.len() > HELD + 1 {
             self.past.pop_front();
         }
@@ -134,72 +140,112 @@ impl<'c> Feel<'c> {
         Some(sample)
     }
 
+    /// The device now, as far as its loop has said anything that counts.
+    fn said(&mut self) -> Option<ToolState> {
+        let now = self.end.tool();
+        (now.time > 0.0 && now.fault.is_none()).then_some(now)
+    }
+
+    /// The device in the frame that is being drawn.
+    fn look(&mut self) -> Option<ToolState> {
+        self.now = self.now.or_else(|| self.said()).or(self.device().copied());
+        self.now
+    }
+
     /// The device so many swaps before the last one.
     fn at(&self, swaps: usize) -> Option<&ToolState> {
         self.past.iter().rev().nth(swaps).or(self.past.front())
     }
 
     /// All that pushes or pulls, or else the nearest bone; none as long as nothing is known.
-    fn model(&self) -> Option<LocalModel> {
-        let (seen, device) = (self.tool?, self.device()?);
-        let position = device.sample.position;
-        let bone = self.bone_model(&seen)?;
-        let parts = [self.held(&seen), self.cut_model(), Some(bone), self.dura(&seen)];
-        let acts = |part: &LocalModel| part.force_at(position) != Vec3::ZERO;
-        let all = parts.into_iter().flatten().filter(acts).reduce(sum);
-        Some(all.unwrap_or(bone))
+    fn model(&mut self) -> Option<LocalModel> {
+        let (seen, device) = (self.tool?, self.look()?);
+        let (bone, normal) = match seen.coupling {
+            Some(coupling) => (self.drilled(coupling)?, None),
+            None => self.nearest(&seen, &device),
+        };
+        let held = self.held(&seen, &device);
+        let dura = self.dura(&seen);
+        let [blade, tool] = &mut self.drags;
+        let cut = blade.follow(&device, seen.work.cuts.then_some([CUTTING, CUTTING_GIVES]), None);
+        let press = normal.map(|normal| bone.force_at(device.sample.position).dot(normal));
+        let rub = press.map(|press| [FRICTION * press, FRICTION_GIVES]);
+        let rub = tool.follow(&device, rub, normal);
+        let acts = |part: &LocalModel| part.force_at(device.sample.position) != Vec3::ZERO;
+        let parts = [held, cut, Some(bone), rub, dura];
+        Some(parts.into_iter().flatten().filter(acts).reduce(sum).unwrap_or(bone))
     }
 
-    /// Of the bone that is nearest, or that the drill is in.
-    fn bone_model(&self, seen: &Seen) -> Option<LocalModel> {
-        if let Some(Coupling { force, stiffness, normal }) = seen.coupling {
-            return Some(spring(force, stiffness, Some(normal), self.at(MOVED)?));
-        }
-        let device = self.device()?;
+    /// Of bone that a drill is in.
+    fn drilled(&self, Coupling { force, stiffness, normal }: Coupling) -> Option<LocalModel> {
+        Some(spring(force, stiffness, Some(normal), self.at(MOVED)?))
+    }
+
+    /// Of the bone that is nearest, or touched deepest, with its normal if it is touched.
+    fn nearest(&self, seen: &Seen, device: &ToolState) -> (LocalModel, Option<Vec3>) {
         let stiffness = seen.push.map_or(ContactStiffness::BONE, ContactStiffness::new);
-        let height = |model: &LocalModel| {
-            model.normal.map_or(f32::INFINITY, |normal| -model.force.dot(normal))
-        };
         let models = self.proxies.iter().map(|(_, proxy)| proxy.model(device, stiffness));
-        let nearest = models.min_by(|a, b| height(a).total_cmp(&height(b)));
+        let press = |model: &LocalModel| model.normal.map(|normal| model.force.dot(normal));
         let (position, time) = (device.sample.position, device.time);
-        Some(nearest.unwrap_or(LocalModel { position, time, ..LocalModel::FREE }))
+        let far = LocalModel { position, time, ..LocalModel::FREE };
+        let nearest = models
+            .filter(|model| model.normal.is_some())
+            .max_by(|a, b| press(a).unwrap_or(0.0).total_cmp(&press(b).unwrap_or(0.0)))
+            .unwrap_or(far);
+        (nearest, nearest.normal.filter(|_| nearest.force_at(position) != Vec3::ZERO))
     }
 
     /// Of what is held: a spring from where it was taken hold of.
-    fn held(&self, seen: &Seen) -> Option<LocalModel> {
+    fn held(&self, seen: &Seen, device: &ToolState) -> Option<LocalModel> {
         let force = seen.work.held;
-        let is_closed = self.device()?.sample.buttons & 1 == 1;
         let then = self.at(HELD)?;
         let drawn = then.sample.position.distance(self.grasp).max(DRAWN);
         let stiffness = (force.length() / drawn).min(HOLD);
-        (is_closed && force != Vec3::ZERO).then(|| spring(force, stiffness, None, then))
+        let holds = device.sample.buttons & 1 == 1 && force != Vec3::ZERO;
+        holds.then(|| spring(force, stiffness, None, then))
     }
 
     /// Of the dura.
     fn dura(&self, seen: &Seen) -> Option<LocalModel> {
         let force = seen.work.tissue;
         let normal = force.try_normalize()?;
-        let along = normal * -DURA;
-        let gradient = Mat3::from_cols(along * normal.x, along * normal.y, along * normal.z);
+        let gradient = along(normal) * -DURA;
         Some(LocalModel { gradient, ..spring(force, 0.0, Some(normal), self.at(TOUCHED)?) })
     }
+}
 
-    /// A blade draws tissue along until that is cut.
-    fn cut(&mut self) {
-        let cuts = self.tool.is_some_and(|tool| tool.work.cuts);
-        self.edge = self.device().filter(|_| cuts).map(|device| {
-            let place = device.sample.position;
-            place + (self.edge.unwrap_or(place) - place).clamp_length_max(GIVES)
-        });
-    }
+/// Dry friction: a spring that gives way up to a distance, and from there on slides along (P. R. Dahl, "A
+/// solid friction model", 1968, in its simplest form).
+#[derive(Clone, Copy, Debug, Default)]
+struct Drag {
+    /// Where the spring's other end is, if there is any friction.
+    anchor: Option<Vec3>,
+}
 
-    /// Of tissue that is cut.
-    fn cut_model(&self) -> Option<LocalModel> {
-        let (edge, device) = (self.edge?, self.device()?);
-        let stiffness = CUTTING / GIVES;
-        Some(spring((edge - device.sample.position) * stiffness, stiffness, None, device))
+impl Drag {
+    /// A device moves on, against at most so many newtons, with so many metres to give way. Friction on a
+    /// surface is along it.
+    fn follow(
+        &mut self,
+        device: &ToolState,
+        friction: Option<[f32; 2]>,
+        normal: Option<Vec3>,
+    ) -> Option<LocalModel> {
+        let place = device.sample.position;
+        let anchor = std::mem::take(&mut self.anchor);
+        let [strength, gives] = friction?;
+        let across = Mat3::IDENTITY - normal.map_or(Mat3::ZERO, along);
+        let way = (across * (anchor.unwrap_or(place) - place)).clamp_length_max(gives);
+        self.anchor = Some(place + way);
+        let stiffness = strength / gives;
+        let gradient = across * -stiffness;
+        Some(LocalModel { gradient, ..spring(way * stiffness, 0.0, None, device) })
     }
+}
+
+/// The projection on a direction of unit length.
+fn along(normal: Vec3) -> Mat3 {
+    Mat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z)
 }
 
 /// A spring that exerts `force` on a tool where the device was `then`.
