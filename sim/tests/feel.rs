@@ -137,7 +137,11 @@ impl Session {
     }
 
     /// Runs it: a frame every 1/60 s, and a thousand ticks a second between the frames.
-    fn run(&self, mut manager: VeManager, mut recorder: Option<&mut Recorder<&mut Vec<u8>>>) -> Seen {
+    fn run(
+        &self,
+        mut manager: VeManager,
+        mut recorder: Option<&mut Recorder<&mut Vec<u8>>>,
+    ) -> Seen {
         let mut link = HapticLink::new();
         let (end, simulation) = link.split();
         let device = SimulatedDevice::new(self.hand, self.motion.clone());
@@ -222,7 +226,11 @@ fn depth(place: Vec3) -> f32 {
 fn an_elevator_rests_on_the_skull() {
     let seen = Session::new(Instrument::Elevator, Hand::FIRM, &pressing(2.0), 3.0).alone();
     let force = seen.force(2.5, 3.0);
-    println!("{force} N, {} mm deep, tool {} mm", 1e3 * depth(seen.ticks.last().unwrap().place), 1e3 * depth(seen.tips.last().unwrap().1));
+    println!(
+        "{force} N, {} mm deep, tool {} mm",
+        1e3 * depth(seen.ticks.last().unwrap().place),
+        1e3 * depth(seen.tips.last().unwrap().1)
+    );
     println!("{:?}", seen.last.forces);
     assert!((force.length() - 2.0).abs() < 0.2, "{force}");
     let out = -head().plan.burr_hole.inward;
@@ -255,7 +263,8 @@ fn a_burr_leads_the_hand() {
     for &(time, tip) in &seen.tips {
         let tick = seen.ticks.iter().rfind(|tick| tick.time <= time).expect("it ticked");
         let (hand, bit) = (depth(tick.place), depth(tip));
-        report += &format!("{time:.3} {:.2} {:.2} {:.2}\n", hand * 1e3, bit * 1e3, tick.force.length());
+        report +=
+            &format!("{time:.3} {:.2} {:.2} {:.2}\n", hand * 1e3, bit * 1e3, tick.force.length());
     }
     println!("{report}{:?}", seen.last.forces);
     for &(time, tip) in &seen.tips {
@@ -341,12 +350,16 @@ impl SceneSpec for Synthetic {
 #[test]
 fn a_session_is_replayed() {
     let entry = head().plan.burr_hole;
-    let keyframes =
-        [over(&entry, 0.1, -0.01, false), over(&entry, 0.4, 0.01, true), over(&entry, 1.5, 0.01, true)];
+    let keyframes = [
+        over(&entry, 0.1, -0.01, false),
+        over(&entry, 0.4, 0.01, true),
+        over(&entry, 1.5, 0.01, true),
+    ];
     let session = Session::new(Instrument::Burr, Hand::LIGHT, &keyframes, 1.5);
     let mut bytes = Vec::new();
     let ve = manager(scene(), ExecutorKind::Pipeline, 2);
-    let mut recorder = Recorder::begin(&mut bytes, &Header::of(&Synthetic), &ve).expect("it begins");
+    let mut recorder =
+        Recorder::begin(&mut bytes, &Header::of(&Synthetic), &ve).expect("it begins");
     let seen = session.run(ve, Some(&mut recorder));
     drop(recorder);
     let again = session.alone();
@@ -356,16 +369,49 @@ fn a_session_is_replayed() {
 
 #[test]
 fn probe() {
-    for (instrument, hand, newtons) in [(Instrument::Elevator, Hand::FIRM, 7.0), (Instrument::Elevator, Hand::FIRM, 2.0), (Instrument::Burr, Hand::FIRM, 7.0), (Instrument::Elevator, Hand::LIGHT, 2.0)] {
-        let mut keys = pressing(newtons);
-        if hand == Hand::LIGHT { keys[1].sample.position += head().plan.burr_hole.inward * 0.01; }
-        let session = Session::new(instrument, hand, &keys, 3.0);
-        let seen = session.run(manager(scene(), ExecutorKind::Serial, 1), None);
-        println!("{instrument:?} {newtons} {hand:?}");
-        for (time, f) in seen.figures.iter().step_by(6) {
-            let t = seen.ticks.iter().rfind(|t| t.time <= *time).unwrap();
-            let lat = (t.place - head().plan.burr_hole.point).reject_from(head().plan.burr_hole.inward);
-            println!("{time:.3} absorbed {:.6} least {:.6} damping {:.2} err {:.4} age {:.3} d {:.3} lat {:.3} F {:.3} v {:.4}", f.absorbed, f.least_absorbed, f.damping, f.interpolation_error, f.greatest_age, 1e3*depth(t.place), 1e3*lat, t.force, t.speed);
+    let entry = head().plan.burr_hole;
+    let keyframes = [
+        // The drill comes after, by 70 mm/s.
+        over(&entry, 1.2, -0.01, false),
+        over(&entry, 1.7, 0.016, false),
+        over(&entry, 2.5, 0.016, true),
+        over(&entry, 5.0, 0.016, true),
+    ];
+    let seen = Session::new(Instrument::Burr, Hand::FIRM, &keyframes, 2.5)
+        .run(manager(scene(), ExecutorKind::Serial, 1), None);
+    let mut e = 0.0_f64;
+    let mut tips = seen.tips.iter().peekable();
+    let mut now = 0.0;
+    let mut figures = seen.figures.iter().peekable();
+    let mut f = None;
+    for pair in seen.ticks.windows(2) {
+        e -= pair[0].force.as_dvec3().dot((pair[1].place - pair[0].place).as_dvec3());
+        while let Some((_, tip)) = tips.next_if(|t| t.0 < pair[1].time) {
+            now = depth(*tip);
+        }
+        while let Some((_, g)) = figures.next_if(|t| t.0 < pair[1].time) {
+            f = Some(*g);
+        }
+        let g = f.map(|f| (f.damping, f.interpolation_error, f.age)).unwrap_or_default();
+        let n = entry.inward;
+        if pair[1].time > 1.39
+            && pair[1].time < 1.75
+            && (pair[1].time * 1000.0).round() as i32 % 4 == 0
+        {
+            println!(
+                "{:.3} E {:.6} v {:.4} d {:.3} tip {:.3} F {:.3} lat {:.3} Flat {:.3} damp {:.2} err {:.3} age {:.3}",
+                pair[1].time,
+                e,
+                pair[1].speed,
+                1e3 * depth(pair[1].place),
+                1e3 * now,
+                -pair[1].force.dot(n),
+                1e3 * (pair[1].place - entry.point).reject_from(n).length(),
+                pair[1].force.reject_from(n).length(),
+                g.0,
+                g.1,
+                g.2
+            );
         }
     }
 }

@@ -13,13 +13,13 @@ use crate::device::model::LocalModel;
 use crate::device::proxy::{ContactStiffness, Proxy};
 use crate::object::{Object, ObjectId};
 
-/// How many swaps before the last one the device was where a tool is in the frame that is drawn: what is
-/// posted at a swap moves it in the frame after the next.
-const MOVED: usize = 1;
-/// Likewise where this frame's contacts found the tool.
+/// How many swaps before the last one the device was where the contacts of the frame that is drawn found the
+/// tool: what is posted at a swap moves it in the frame after the next, and contacts find it a frame later.
 const TOUCHED: usize = 2;
 /// Likewise where the tool was when that which it holds was drawn there, which has told since.
 const HELD: usize = 3;
+/// How far a drill is led beside the device at most, in metres; usually 1 mm.
+const SHIFT: f32 = 0.001;
 /// The stiffness with which the dura is felt, in newtons per metre; usually 200, that of its contact.
 const DURA: f32 = 200.0;
 /// The greatest stiffness with which what is held is felt, in newtons per metre; usually 1,000.
@@ -52,6 +52,10 @@ pub(super) struct Feel<'c> {
     tool: Option<Seen>,
     /// For each volume of bone.
     proxies: Vec<(ObjectId, Proxy)>,
+    /// Where the hand felt the surface of bone, if it touches any.
+    rest: Option<Vec3>,
+    /// By how much a drill in bone is led ahead of the device.
+    shift: Option<Vec3>,
     /// Where the tool was when it took hold.
     grasp: Vec3,
     /// Of a blade in what it cuts, and of the tool on bone.
@@ -72,7 +76,8 @@ impl<'c> Feel<'c> {
     pub(super) fn new(end: SimulationEnd<'c>) -> Self {
         let past = VecDeque::with_capacity(HELD + 2);
         let (now, tool, proxies, drags) = (None, None, Vec::new(), Default::default());
-        Self { end, now, past, tool, proxies, grasp: Vec3::ZERO, drags }
+        let (rest, shift, grasp) = (None, None, Vec3::ZERO);
+        Self { end, now, past, tool, proxies, rest, shift, grasp, drags }
     }
 
     /// The device at the last swap; none as long as its loop said nothing.
@@ -89,7 +94,7 @@ impl<'c> Feel<'c> {
         if work.held == Vec3::ZERO {
             self.grasp = tip;
         }
-        let coupling = tool.coupling(tip);
+        let coupling = tool.coupling();
         self.tool = Some(Seen { tip, work, coupling, push: tool.coupling_stiffness() });
     }
 
@@ -131,8 +136,10 @@ impl<'c> Feel<'c> {
             self.past.pop_front();
         }
         let mut sample = self.device()?.sample;
-        if !self.tool.is_some_and(|tool| tool.push.is_some()) {
-            // What is blunt stays outside; a drill finds its own way.
+        if self.tool.is_some_and(|tool| tool.push.is_some()) {
+            // A drill finds its own way.
+            sample.position += self.shift.unwrap_or_default();
+        } else {
             for (_, proxy) in &self.proxies {
                 sample.position = proxy.held_out(sample.position);
             }
@@ -161,7 +168,7 @@ impl<'c> Feel<'c> {
     fn model(&mut self) -> Option<LocalModel> {
         let (seen, device) = (self.tool?, self.look()?);
         let (bone, normal) = match seen.coupling {
-            Some(coupling) => (self.drilled(coupling)?, None),
+            Some(coupling) => (self.drilled(seen.tip, coupling, &device), None),
             None => self.nearest(&seen, &device),
         };
         let held = self.held(&seen, &device);
@@ -176,13 +183,25 @@ impl<'c> Feel<'c> {
         Some(parts.into_iter().flatten().filter(acts).reduce(sum).unwrap_or(bone))
     }
 
-    /// Of bone that a drill is in.
-    fn drilled(&self, Coupling { force, stiffness, normal }: Coupling) -> Option<LocalModel> {
-        Some(spring(force, stiffness, Some(normal), self.at(MOVED)?))
+    /// Of bone that a drill is in with its tip.
+    ///
+    /// A wide bit touches bone elsewhere than its tip does, on which the hand may rest already. A step from
+    /// the one to the other would push the hand; so the drill is led by as much beside the device.
+    fn drilled(&mut self, tip: Vec3, coupling: Coupling, device: &ToolState) -> LocalModel {
+        let Coupling { stiffness, normal, .. } = coupling;
+        let place = device.sample.position;
+        let shift = *self.shift.get_or_insert_with(|| {
+            let step = match self.rest {
+                Some(rest) => (tip - rest).dot(normal),
+                None => (tip - place).dot(normal).max(0.0),
+            };
+            normal * step.clamp(-SHIFT, SHIFT)
+        });
+        spring(coupling.force(place + shift - tip), stiffness, Some(normal), device)
     }
 
     /// Of the bone that is nearest, or touched deepest, with its normal if it is touched.
-    fn nearest(&self, seen: &Seen, device: &ToolState) -> (LocalModel, Option<Vec3>) {
+    fn nearest(&mut self, seen: &Seen, device: &ToolState) -> (LocalModel, Option<Vec3>) {
         let stiffness = seen.push.map_or(ContactStiffness::BONE, ContactStiffness::new);
         let models = self.proxies.iter().map(|(_, proxy)| proxy.model(device, stiffness));
         let press = |model: &LocalModel| model.normal.map(|normal| model.force.dot(normal));
@@ -192,7 +211,10 @@ impl<'c> Feel<'c> {
             .filter(|model| model.normal.is_some())
             .max_by(|a, b| press(a).unwrap_or(0.0).total_cmp(&press(b).unwrap_or(0.0)))
             .unwrap_or(far);
-        (nearest, nearest.normal.filter(|_| nearest.force_at(position) != Vec3::ZERO))
+        let normal = nearest.normal.filter(|_| nearest.force_at(position) != Vec3::ZERO);
+        self.shift = None;
+        self.rest = normal.map(|_| position + nearest.force / stiffness.newtons_per_metre());
+        (nearest, normal)
     }
 
     /// Of what is held: a spring from where it was taken hold of.
