@@ -34,7 +34,7 @@ const CUTTING_GIVES: f32 = 0.003;
 const FRICTION: f32 = 0.2;
 /// How far an instrument gives way on bone before it slides, in metres; usually 1 mm. Bone from a CT is
 /// uneven with a radius of some 10 mm: by friction divided by this its hold is stiffer than that is unstable.
-const FRICTION_GIVES: f32 = 0.001;
+const FRICTION_GIVES: f32 = 0.000_5;
 
 /// Joins a haptic loop with a tool.
 ///
