@@ -258,8 +258,10 @@ fn strokes_over_the_skull_are_sound() {
         keyframes.extend((0..8).map(stroke));
         let seen = Session::new(Instrument::Elevator, hand, &keyframes, 5.0).alone();
         let error = seen.last.forces.error_rms();
-        println!("PROBE {hand:?} {error} {:?} {:?}", seen.force(1.0, 1.5), seen.force(2.0, 2.5));
-        assert!(error < 0.3, "{hand:?}: an interpolation error of {error} N");
+        let force = seen.force(1.0, 5.0).length();
+        println!("{hand:?}: {force} N, interpolation error {error} N rms");
+        // Mostly of the friction, which within a frame is a spring.
+        assert!(error < 0.25 * f64::from(force), "{hand:?}: {error} N of {force} N");
     }
 }
 

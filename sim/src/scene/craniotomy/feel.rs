@@ -32,8 +32,9 @@ const CUTTING: f32 = 1.0;
 const CUTTING_GIVES: f32 = 0.003;
 /// The coefficient of friction of an instrument on bone; usually 0.2.
 const FRICTION: f32 = 0.2;
-/// How far an instrument gives way on bone before it slides, in metres; usually 1 mm. Bone from a CT is
-/// uneven with a radius of some 10 mm: by friction divided by this its hold is stiffer than that is unstable.
+/// How far an instrument gives way on bone before it slides, in metres; usually 0.5 mm. Bone from a CT is
+/// uneven, with radii of some 10 mm, on which a hand that presses without friction swings to and fro, for
+/// the slope that it feels is a frame old; friction over this is stiffer than the force over such a radius.
 const FRICTION_GIVES: f32 = 0.000_5;
 
 /// Joins a haptic loop with a tool.
@@ -260,6 +261,7 @@ impl Drag {
         let way = (across * (anchor.unwrap_or(place) - place)).clamp_length_max(gives);
         self.anchor = Some(place + way);
         let stiffness = strength / gives;
+        // Also while it slides: a force that stays the same where a hand turns back would push it.
         let gradient = across * -stiffness;
         Some(LocalModel { gradient, ..spring(way * stiffness, 0.0, None, device) })
     }
