@@ -1,0 +1,172 @@
+//! The mouse as the tool in one of two hands.
+
+use std::sync::Arc;
+
+use dualframe_sim::behavior::{Instrument, Tool};
+use dualframe_sim::mailbox::Mailbox;
+use dualframe_sim::message::Message;
+use dualframe_sim::object::Object;
+use dualframe_sim::scene::craniotomy::{Report, TOOLS};
+use dualframe_sim::scene::head::{Entry, Head};
+use egui::{Color32, Ui};
+use glam::Vec3;
+
+use super::held::{Goal, Held};
+use super::panel;
+use crate::app::window::controls::Controls;
+use crate::app::window::hand::{Aim, Hand, Marks};
+
+/// How far one looks for what is under the mouse, in metres.
+const SIGHT: f32 = 2.0;
+
+/// The planned incision's colour: that of a surgeon's pen.
+const INCISION: Color32 = Color32::from_rgb(110, 60, 190);
+/// The planned craniotomy's colour.
+const CRANIOTOMY: Color32 = Color32::from_rgb(40, 150, 90);
+/// Half the length of the cross on the planned burr hole, in metres; usually 5 mm.
+const BURR_HOLE: f32 = 0.005;
+
+/// The two hands, one of which the mouse leads.
+pub(in crate::app) struct ToolGrip {
+    head: Arc<Head>,
+    pub(super) hands: [Held; TOOLS.len()],
+    /// The hand that the mouse leads.
+    pub(super) active: usize,
+    /// From where, and in which direction, one looks for what is under the mouse.
+    sight: Option<(Vec3, Vec3)>,
+    /// How far that is, in this frame.
+    distance: Option<f32>,
+    /// Whether no script moves the hands.
+    pub(super) is_free: bool,
+    pub(super) score: Report,
+    /// What was chosen in the overlay, and not yet told.
+    chosen: Option<Instrument>,
+    /// Whether the plan is shown.
+    pub(super) is_planned: bool,
+}
+
+impl ToolGrip {
+    pub(super) fn new(head: Arc<Head>, is_free: bool) -> Self {
+        Self {
+            head,
+            hands: Default::default(),
+            active: 0,
+            sight: None,
+            distance: None,
+            is_free,
+            score: Report::default(),
+            chosen: None,
+            is_planned: is_free,
+        }
+    }
+
+    fn held(&mut self) -> &mut Held {
+        &mut self.hands[self.active]
+    }
+
+    /// Takes up what was chosen.
+    fn take_up(&mut self, mailbox: &Mailbox) {
+        if let Some(instrument) = self.chosen.take()
+            && self.held().take_up(instrument)
+        {
+            mailbox.post(TOOLS[self.active], Message::TakeUp(instrument));
+        }
+    }
+
+    /// What the other hand holds stays held.
+    pub(super) fn change_hands(&mut self) {
+        self.held().leave();
+        self.active = 1 - self.active;
+    }
+
+    /// What the hand that the mouse leads is to take up.
+    pub(super) fn choose(&mut self, instrument: Instrument) {
+        self.chosen = Some(instrument);
+    }
+}
+
+impl Hand for ToolGrip {
+    const HELP: &'static str = "left: use the instrument · 1 to 7: take up another · x: other hand, \
+                                what is held stays held";
+
+    fn forget(&mut self) {
+        let is_free = self.is_free;
+        *self = Self::new(Arc::clone(&self.head), is_free);
+    }
+
+    fn press(&mut self, aim: &Aim<'_>) {
+        if self.is_free {
+            self.held().press(|anchor| aim.at_depth_of(anchor));
+        }
+    }
+
+    fn release(&mut self, _aim: &Aim<'_>) {
+        self.held().release();
+    }
+
+    fn is_busy(&self) -> bool {
+        self.is_free && self.hands[self.active].is_pressed()
+    }
+
+    fn wheel(&mut self, lines: f32) {
+        self.held().lift(lines);
+    }
+
+    fn key(&mut self, key: char) {
+        let number = key.to_digit(10).and_then(|digit| digit.checked_sub(1));
+        let named = number.and_then(|number| Instrument::ALL.get(number as usize));
+        match named {
+            Some(&instrument) => self.choose(instrument),
+            None if key == 'x' => self.change_hands(),
+            None => {}
+        }
+    }
+
+    fn see(&mut self, object: &Object) {
+        if let (Some(hand), Some(tool)) =
+            (TOOLS.iter().position(|&tool| tool == object.id()), Tool::of(object))
+        {
+            self.hands[hand].note(tool, object.center(), self.is_free);
+        } else if let Some((eye, direction)) = self.sight {
+            let nearest = self.distance.unwrap_or(SIGHT);
+            self.distance = object.geometry.cast(eye, direction, nearest).or(self.distance);
+        }
+    }
+
+    fn follow(&mut self, aim: &Aim<'_>) {
+        let (eye, direction) = self.sight.replace(aim.ray()).unwrap_or_default();
+        let under = self.distance.take().map(|distance| eye + direction * distance);
+        if !self.is_free {
+            return;
+        }
+        self.take_up(aim.mailbox);
+        let side = aim.painter.camera.axes().0 * if self.active == 0 { 1.0 } else { -1.0 };
+        let inner = |place: Vec3| self.head.inner_at(place);
+        let goal = Goal { under, side, inner: &inner, drawn: &|anchor| aim.at_depth_of(anchor) };
+        if let Some(sample) = self.hands[self.active].next(&goal) {
+            aim.mailbox.post(TOOLS[self.active], Message::Device(sample));
+        }
+    }
+
+    fn mark(&self, marks: &Marks<'_>) {
+        if !self.is_planned {
+            return;
+        }
+        let plan = &self.head.plan;
+        let incision = plan.incision.iter().copied().zip(plan.incision_normals.iter().copied());
+        marks.line(incision, INCISION);
+        let on_bone = |entry: &Entry| (entry.point, -entry.inward);
+        let around = plan.craniotomy.iter().chain(plan.craniotomy.first());
+        marks.line(around.map(on_bone), CRANIOTOMY);
+        let Entry { point, inward, .. } = plan.burr_hole;
+        let across = inward.any_orthonormal_vector();
+        for arm in [across, inward.cross(across)].map(|arm| arm * BURR_HOLE) {
+            marks
+                .line([point - arm, point + arm].into_iter().map(|end| (end, -inward)), CRANIOTOMY);
+        }
+    }
+
+    fn panel(&mut self, ui: &mut Ui, controls: &mut Controls) {
+        panel::show(ui, self, controls);
+    }
+}

@@ -1,0 +1,69 @@
+//! What the overlay shows of an operation.
+
+use dualframe_sim::behavior::Instrument;
+use dualframe_sim::scene::craniotomy::Report;
+use egui::{Checkbox, Grid, Ui};
+
+use super::grip::ToolGrip;
+use crate::app::window::controls::Controls;
+
+/// The hands' names, in their order.
+const HANDS: [&str; 2] = ["right", "left"];
+
+pub(super) fn show(ui: &mut Ui, grip: &mut ToolGrip, controls: &mut Controls) {
+    instruments(ui, grip);
+    ui.separator();
+    score(ui, &grip.score);
+    ui.horizontal(|ui| {
+        ui.add(Checkbox::new(&mut grip.is_planned, "show the plan"));
+        if ui.button("Begin anew").clicked() {
+            controls.restarts += 1;
+        }
+    });
+}
+
+fn instruments(ui: &mut Ui, grip: &mut ToolGrip) {
+    if !grip.is_free {
+        ui.label("a script operates");
+    }
+    Grid::new("hands").num_columns(2).show(ui, |ui| {
+        for (hand, name) in HANDS.into_iter().enumerate() {
+            if ui.selectable_label(hand == grip.active, name).clicked() && hand != grip.active {
+                grip.change_hands();
+            }
+            let held = &grip.hands[hand];
+            let force = (held.work.bone + held.work.tissue).length();
+            let use_of_it = if held.is_used() { ", in use" } else { "" };
+            ui.label(format!("{}{use_of_it}: {force:.1} N", held.instrument.name()));
+            ui.end_row();
+        }
+    });
+    ui.horizontal_wrapped(|ui| {
+        for (number, instrument) in Instrument::ALL.into_iter().enumerate() {
+            let is_held = grip.hands[grip.active].instrument == instrument;
+            let name = format!("{} {}", number + 1, instrument.name());
+            if ui.selectable_label(is_held, name).clicked() {
+                grip.choose(instrument);
+            }
+        }
+    });
+}
+
+fn score(ui: &mut Ui, score: &Report) {
+    let millimetres = |length: f32| length * 1e3;
+    Grid::new("score").num_columns(2).show(ui, |ui| {
+        let mut line = |name: &str, value: String| {
+            ui.label(name);
+            ui.label(value);
+            ui.end_row();
+        };
+        line("time", format!("{:.0} s", score.seconds));
+        let (drilling, air) = (score.drilling_seconds, score.air_seconds);
+        line("drilling", format!("{drilling:.1} s, {air:.1} s of it in air"));
+        let (peak, p95) = (score.peak_force, score.force_p95);
+        line("force on bone", format!("{peak:.1} N at most, 95 % below {p95:.2} N"));
+        line("past the inner table", format!("{:.2} mm", millimetres(score.plunge)));
+        let (tears, length) = (score.dural_tears, millimetres(score.dural_tear_length));
+        line("dural tears", format!("{tears}, {length:.1} mm"));
+    });
+}
