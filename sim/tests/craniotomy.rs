@@ -28,7 +28,7 @@ fn head() -> Arc<Head> {
 /// An operation under way.
 struct Theatre {
     manager: VeManager,
-    operation: Operation,
+    operation: Operation<'static>,
     settings: Settings,
     freed: Vec<u64>,
 }

@@ -4,6 +4,7 @@ mod abreast;
 pub(crate) mod batch;
 mod bone;
 pub mod drill;
+mod felt;
 mod fixed;
 mod instrument;
 mod mass_spring;
@@ -29,6 +30,7 @@ use crate::object::{Object, ObjectId};
 use crate::simd::Simd;
 
 pub use bone::Bone;
+pub use felt::Felt;
 pub use fixed::Fixed;
 pub use instrument::Instrument;
 pub use mass_spring::{MassSpring, MassSpringError};

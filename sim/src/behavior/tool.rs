@@ -7,8 +7,8 @@ use glam::{Quat, Vec3};
 use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
-use super::drill::{Bit, Burr, Erode, Feed, Perforator, Reaction};
-use super::{Behavior, Input, Instrument, piece, tissue};
+use super::drill::{Bit, Burr, Coupling, Erode, Feed, Perforator, Reaction};
+use super::{Behavior, Felt, Input, Instrument, piece, tissue};
 use crate::device::DeviceSample;
 use crate::geometry::{Blade, Geometry, Rigid};
 use crate::message::{Custom, Message};
@@ -65,6 +65,10 @@ pub struct Work {
     pub bone: Vec3,
     /// The force of soft tissue on it, in newtons.
     pub tissue: Vec3,
+    /// The force of what it holds on it, in newtons.
+    pub held: Vec3,
+    /// Whether its edge was in tissue.
+    pub cuts: bool,
     /// Whether its bit turned.
     pub turns: bool,
 }
@@ -88,6 +92,8 @@ pub struct Tool {
     /// Of bone, in the frame before.
     reaction: Reaction,
     spin: f32,
+    /// By what it works on, for the frame that comes.
+    told: Felt,
     work: Work,
     shapes: [SharedShape; Instrument::ALL.len()],
 }
@@ -118,6 +124,7 @@ impl Tool {
             perforator: Perforator::new(),
             reaction: Reaction::default(),
             spin: 0.0,
+            told: Felt::default(),
             work: Work::default(),
             shapes,
         };
@@ -153,6 +160,25 @@ impl Tool {
     #[must_use]
     pub fn work(&self) -> Work {
         self.work
+    }
+
+    /// How what it works on holds the hand on a drill back whose tip is at `tip`, in metres; none for
+    /// another instrument, and where no bone is touched.
+    #[must_use]
+    pub fn coupling(&self, tip: Vec3) -> Option<Coupling> {
+        self.feed()?.coupling(tip, self.device.position, &self.reaction)
+    }
+
+    /// The stiffness of that hold, in newtons per metre; none for what is no drill.
+    #[must_use]
+    pub fn coupling_stiffness(&self) -> Option<f32> {
+        self.feed().map(Feed::stiffness)
+    }
+
+    /// Adds what a body tells.
+    pub(super) fn told(&mut self, felt: Felt) {
+        self.told.held += felt.held;
+        self.told.cuts |= felt.cuts;
     }
 
     /// What it can work on, to add what is new.
@@ -261,7 +287,9 @@ impl Tool {
             }
         }
         self.reaction = reaction;
-        self.work = Work { bone: reaction.force, tissue, turns: self.spin != 0.0 };
+        let Felt { held, cuts } = std::mem::take(&mut self.told);
+        let cuts = cuts && self.instrument == Instrument::Scalpel && self.is_pressed();
+        self.work = Work { bone: reaction.force, tissue, held, cuts, turns: self.spin != 0.0 };
     }
 }
 

@@ -74,7 +74,8 @@ impl LocalModel {
 
 /// A local model within what a device can show: symmetric, no direction stiffer than the device allows,
 /// none with a stiffness that pushes away (which would be unstable by itself), no force beyond the
-/// device's. With it, the energy that it stores.
+/// device's. A contact that is too stiff is softer, and stays in its place. With it, the energy that it
+/// stores.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounded {
     model: LocalModel,
@@ -91,8 +92,11 @@ impl Bounded {
         let stiffness = (-values).clamp(DVec3::ZERO, DVec3::splat(most));
         let inverse = |k: f64| if k < LEAST_STIFFNESS { 0.0 } else { 1.0 / k };
         let of = |diagonal: DVec3| vectors * DMat3::from_diagonal(diagonal) * vectors.transpose();
+        // A contact that is shown softer begins where it did.
+        let shown = of((-values).map(|k| if k > most { most / k } else { 1.0 }));
+        let force = (shown * model.force.as_dvec3()).as_vec3();
         Self {
-            model: LocalModel { gradient: -of(stiffness).as_mat3(), ..model },
+            model: LocalModel { force, gradient: -of(stiffness).as_mat3(), ..model },
             compliance: of(stiffness.map(inverse)),
             max_force: device.max_force,
         }
@@ -151,6 +155,16 @@ mod tests {
         assert!(bounded.model.gradient.abs_diff_eq(expected, 0.1), "{}", bounded.model.gradient);
         let far = bounded.force_at(Vec3::new(0.0, -1.0, 0.0));
         assert!((far.length() - device.max_force).abs() < 1e-3);
+    }
+
+    /// A wall that is stiffer than the device begins where it is, and gives way more.
+    #[test]
+    fn a_softer_wall_is_in_the_same_place() {
+        let device = SimulatedDevice::DESCRIPTION;
+        let bounded = Bounded::new(wall(3.0 * device.max_stiffness), &device);
+        let force = |height: f32| bounded.force_at(Vec3::Y * height).y;
+        assert!((force(0.0) - 5.0).abs() < 1e-3, "{} N at 1 mm", force(0.0));
+        assert!(force(0.99e-3) > 0.0 && force(1.01e-3) == 0.0);
     }
 
     /// The stored energy is the work of the force on the way out.

@@ -82,6 +82,14 @@ impl Proxy {
         self.touches
     }
 
+    /// `place` itself, or where the surface holds a tool that touches it and wants to be there: no deeper
+    /// than the proxy.
+    #[must_use]
+    pub fn held_out(&self, place: Vec3) -> Vec3 {
+        let Some(normal) = self.normal.filter(|_| self.touches) else { return place };
+        place + normal * (self.position - place).dot(normal).max(0.0)
+    }
+
     /// The tool is at `tool` now.
     pub fn follow(&mut self, tool: Vec3, surface: &impl Surface) {
         let (distance, _) = surface.distance(tool);

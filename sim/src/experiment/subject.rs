@@ -72,7 +72,7 @@ impl Subject {
         Ok(Session { manager: VeManager::new(scene, settings)?, operation: self.operation() })
     }
 
-    fn operation(&self) -> Option<Operation> {
+    fn operation(&self) -> Option<Operation<'static>> {
         match self {
             Self::Particles(_) => None,
             Self::Retraction(head) => {
@@ -95,7 +95,7 @@ impl fmt::Display for Subject {
 pub struct Session {
     /// The environment.
     pub manager: VeManager,
-    operation: Option<Operation>,
+    operation: Option<Operation<'static>>,
 }
 
 impl Session {

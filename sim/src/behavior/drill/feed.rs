@@ -15,6 +15,19 @@ pub struct FeedError {
     pub value: f32,
 }
 
+/// What a hand feels of a tool that bone holds back: the spring by which its [`Feed`] pushes the tool on, the
+/// virtual coupling of J. E. Colgate, M. C. Stanley, J. M. Brown, "Issues in the haptic display of tool
+/// use", IROS 1995.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coupling {
+    /// On the hand, in newtons: against its push, and as strong at most.
+    pub force: Vec3,
+    /// Of the spring, in newtons per metre; usually 5,000.
+    pub stiffness: f32,
+    /// The outward normal of the bone, of unit length: a hand that goes out along it is not held.
+    pub normal: Vec3,
+}
+
 /// A hand that pushes a tool towards a place as strongly as it can, by admittance: in contact it moves by
 /// the force that is left over, divided by a resistance. So there is no stiff loop, and a frame of 1/60 s
 /// will do: a bit settles without overshoot as long as the resistance, in N·s/m, is more than the time step
@@ -81,13 +94,34 @@ impl Feed {
             let leave = normal * out.min(self.free_step);
             return place + leave + across.clamp_length_max(self.contact_step);
         }
-        let stiffness = self.strength / Self::REACH;
-        let push = |way: Vec3| (way * stiffness).clamp_length_max(self.strength);
-        let force = push(normal * out) + push(across) + reaction.force;
+        let force = self.push(normal * out) + self.push(across) + reaction.force;
         let step = force * (time_step / self.resistance);
         let back = step.dot(normal).max(0.0);
         let rest = (step - normal * back).clamp_length_max(self.contact_step);
         place + normal * back.min(self.free_step) + rest
+    }
+
+    /// The force of a hand that wants to go so far one way, in newtons.
+    fn push(&self, way: Vec3) -> Vec3 {
+        (way * self.stiffness()).clamp_length_max(self.strength)
+    }
+
+    /// The stiffness of the spring by which the hand pushes, in newtons per metre: its strength at
+    /// [`Feed::REACH`].
+    #[must_use]
+    pub fn stiffness(&self) -> f32 {
+        self.strength / Self::REACH
+    }
+
+    /// What holds the hand back from where it wants the tool (`intended`) if the tool got only to `place`,
+    /// in metres; none where no bone is touched, for there the tool only comes after.
+    #[must_use]
+    pub fn coupling(&self, place: Vec3, intended: Vec3, reaction: &Reaction) -> Option<Coupling> {
+        let normal = reaction.normal()?;
+        let way = intended - place;
+        let out = way.dot(normal);
+        let push = self.push(normal * out.min(0.0)) + self.push(way - normal * out);
+        Some(Coupling { force: -push, stiffness: self.stiffness(), normal })
     }
 
     /// How hard the hand presses the bit on the bone, in newtons: the load that the bone bears, but no

@@ -10,6 +10,7 @@
 //! | [`Erode`], [`Erosions`] | what a bit takes away: a message, and what bone does with it |
 //! | [`Perforator`] | the clutch that stops where the bone ends |
 //! | [`Reaction`], [`Feed`] | what a tool feels, and how it goes on from there |
+//! | [`Coupling`] | what the hand feels of it |
 //!
 //! A tool shows its bit by [`Behavior::burr`]; [`BurrInBone`] and [`BurrForce`] turn it into contacts, which
 //! the tool's update reads as a [`Reaction`]. It then posts an [`Erode`] to the bone and moves by its
@@ -28,7 +29,7 @@ mod reaction;
 use glam::Vec3;
 
 pub use erosion::{Erode, Erosions};
-pub use feed::{Feed, FeedError};
+pub use feed::{Coupling, Feed, FeedError};
 pub use overlap::{Overlap, half_space_depth};
 pub use perforator::Perforator;
 pub use reaction::Reaction;

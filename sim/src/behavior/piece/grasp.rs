@@ -158,6 +158,11 @@ impl Hands {
         self.0.iter().map(|hand| hand.force(volume)).sum()
     }
 
+    /// What each feels of a piece at rest, in newtons.
+    pub(super) fn felt(&self, volume: &Volume) -> impl Iterator<Item = (ObjectId, Vec3)> {
+        self.0.iter().map(|hand| (hand.by, -hand.force(volume)))
+    }
+
     /// Lets them pull for a frame of `time` seconds.
     pub(super) fn pull(&self, body: &mut Body, volume: &Volume, time: f32) {
         if body.mass > 0.0 {

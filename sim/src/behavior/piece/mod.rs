@@ -11,9 +11,10 @@ use parry3d::math::Pose;
 
 use self::grasp::Hands;
 use super::drill::Erosions;
-use super::{Behavior, Input};
+use super::{Behavior, Felt, Input};
 use crate::geometry::{Geometry, Volume};
 use crate::interaction::Contact;
+use crate::message::Message;
 use crate::object::ObjectId;
 
 pub use body::{BONE_DENSITY, Body};
@@ -160,6 +161,9 @@ impl Behavior for Piece {
             self.body.velocity = self.body.velocity * along + input.gravity * time;
             self.body.angular_momentum *= around;
             self.hands.pull(&mut self.body, volume, time);
+        }
+        for (by, held) in self.hands.felt(volume) {
+            input.post(by, Message::Custom(Box::new(Felt { held, cuts: false })));
         }
         volume.margin = if self.seated { 0.0 } else { self.body.fastest(volume) * time };
     }

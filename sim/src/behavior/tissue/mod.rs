@@ -17,7 +17,7 @@ use self::anchors::{Anchors, Grip};
 use self::kernel::{Advance, Nodes, ToCenter};
 use self::material::check;
 use self::springs::Springs;
-use super::{Behavior, Input};
+use super::{Behavior, Felt, Input};
 use crate::geometry::{CutNode, CutSurface, Geometry, Mesh, Sweep, Topology, Vectors, edges};
 use crate::interaction::Contact;
 use crate::message::Message;
@@ -247,6 +247,17 @@ impl Tissue {
         mesh.is_whole() && mesh.topology().nodes() == self.rest.len()
     }
 
+    /// Tells the tools that hold it, or whose blades are in it, what they feel of it.
+    fn tell(&self, input: &mut Input<'_>) {
+        let hold = |grip: &&Grip| grip.by != ObjectId::HOST && !grip.nodes.is_empty();
+        let held = self.anchors.grips.iter().filter(hold);
+        let held = held.map(|grip| (grip.by, Felt { held: grip.force, cuts: false }));
+        let cut = self.fronts.iter().map(|&(by, _)| (by, Felt { held: Vec3::ZERO, cuts: true }));
+        for (by, felt) in held.chain(cut) {
+            input.post(by, Message::Custom(Box::new(felt)));
+        }
+    }
+
     /// Fits the springs to a substep's time, in seconds.
     fn fit(&mut self, time: f32, mesh: &Mesh) {
         if self.fitted != time {
@@ -286,6 +297,7 @@ impl Behavior for Tissue {
         });
         self.nodes.store(mesh);
         self.anchors.end(time, self.substeps);
+        self.tell(input);
     }
 
     fn process(&mut self, message: &Message) {

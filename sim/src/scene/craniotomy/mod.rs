@@ -5,10 +5,12 @@
 //! | `build` | the objects and the modelled interactions, from a [`Head`] |
 //! | `script`, `steps` | what two hands do, step by step of the operation |
 //! | [`Operation`] | what the host does: it moves the hands, keeps the score and frees bone |
+//! | `feel` | joins a hand with a haptic loop, so that it moves a tool and feels it |
 //! | `freeing` | bone that a closed cut has freed becomes an object of its own |
 //! | [`Score`] | what educators measure |
 
 mod build;
+mod feel;
 mod freeing;
 mod operation;
 mod score;

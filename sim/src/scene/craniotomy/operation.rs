@@ -1,17 +1,21 @@
 //! An operation: what its host does while frames run, and between them.
 
 use std::any::Any;
+use std::cell::RefCell;
 use std::sync::Arc;
 
+use super::feel::Feel;
 use super::score::{Report, Score};
 use super::script::Script;
 use super::steps::{self, Step};
 use super::{SKULL, TIME_STEP, TOOLS, freeing};
 use crate::behavior::Bone;
+use crate::device::link::{SimulationEnd, ToolState};
 use crate::executor::ExecutorError;
 use crate::geometry::Bounds;
 use crate::mailbox::Mailbox;
 use crate::manager::VeManager;
+use crate::message::Message;
 use crate::object::Object;
 use crate::render::Renderer;
 use crate::scene::Scene;
@@ -24,24 +28,38 @@ pub const LOOK_FRAMES: u64 = 60;
 const MARGIN: f32 = 0.015;
 
 /// What the host of an operation does: it moves the hands, keeps the score, and makes an object of bone that
-/// comes free.
-pub struct Operation {
+/// comes free. A hand that a haptic loop is linked to moves as its device does, and feels what its tool meets.
+pub struct Operation<'c> {
     head: Arc<Head>,
     script: Script,
+    feels: Feels<'c>,
     score: Score,
     region: Bounds,
     /// What the skull had lost at the last look.
     removed: u64,
 }
 
-impl Operation {
+/// The hands that haptic loops are linked to. What posts and what watches take turns with them.
+type Feels<'c> = [Option<RefCell<Feel<'c>>>; 2];
+
+impl<'c> Operation<'c> {
     /// An operation on a head, scripted as far as `step` says; without one nobody moves the hands.
     #[must_use]
     pub fn new(head: Arc<Head>, step: Option<Step>) -> Self {
         let script =
             step.map_or_else(|| Script::new(TOOLS, TIME_STEP), |step| steps::script(&head, step));
         let region = region(&head);
-        Self { head, script, score: Score::new(TIME_STEP), region, removed: 0 }
+        let (feels, score) = ([None, None], Score::new(TIME_STEP));
+        Self { head, script, feels, score, region, removed: 0 }
+    }
+
+    /// Links hand number `hand` (0 or 1) with a haptic loop: from the next frame on its tool is where the
+    /// device is, and the script says no more than which instrument it is. The loop's hand feels the tool.
+    /// A hand that there is not is not linked.
+    pub fn link(&mut self, hand: usize, end: SimulationEnd<'c>) {
+        if let Some(feel) = self.feels.get_mut(hand) {
+            *feel = Some(RefCell::new(Feel::new(end)));
+        }
     }
 
     /// The frames that the script takes.
@@ -58,9 +76,12 @@ impl Operation {
 
     /// Splits it into what posts and what watches: the one is told of every frame that was swapped, the
     /// other is the renderer.
-    pub fn parts<'a>(&'a mut self, renderer: &'a mut dyn Renderer) -> (Hands<'a>, Watch<'a>) {
-        let Self { head, script, score, .. } = self;
-        (Hands { script }, Watch { renderer, head, score })
+    pub fn parts<'a>(
+        &'a mut self,
+        renderer: &'a mut dyn Renderer,
+    ) -> (Hands<'a, 'c>, Watch<'a, 'c>) {
+        let Self { head, script, feels, score, .. } = self;
+        (Hands { script, feels }, Watch { renderer, head, feels, score })
     }
 
     /// What was measured so far.
@@ -106,34 +127,54 @@ impl Operation {
 }
 
 /// What moves the hands.
-pub struct Hands<'a> {
+#[derive(Clone, Copy)]
+pub struct Hands<'a, 'c> {
     script: &'a Script,
+    feels: &'a Feels<'c>,
 }
 
-impl Hands<'_> {
+impl Hands<'_, '_> {
     /// A frame was swapped: posts what the hands do two frames later.
     pub fn swapped(&self, frame: u64, mailbox: &Mailbox) {
-        self.script.post(frame, mailbox);
+        self.script.post(frame, self.feels.each_ref().map(Option::is_some), mailbox);
+        for (tool, feel) in TOOLS.into_iter().zip(self.feels) {
+            let sample = feel.as_ref().and_then(|feel| feel.borrow_mut().sample());
+            sample.into_iter().for_each(|sample| mailbox.post(tool, Message::Device(sample)));
+        }
+    }
+
+    /// The device of hand number `hand` (0 or 1) at the last swap, with all that its loop has measured;
+    /// none where no loop is linked, or none has said anything yet.
+    #[must_use]
+    pub fn device(&self, hand: usize) -> Option<ToolState> {
+        self.feels.get(hand)?.as_ref()?.borrow().device().copied()
     }
 }
 
-/// A renderer that keeps the score of what it is shown.
-pub struct Watch<'a> {
+/// A renderer that keeps the score of what it is shown, and lets hands feel it.
+pub struct Watch<'a, 'c> {
     renderer: &'a mut dyn Renderer,
     head: &'a Head,
+    feels: &'a Feels<'c>,
     score: &'a mut Score,
 }
 
-impl Renderer for Watch<'_> {
+impl Renderer for Watch<'_, '_> {
     fn draw(&mut self, object: &Object) {
         if let Some(hand) = TOOLS.iter().position(|&tool| tool == object.id()) {
             self.score.note(hand, object, |place| self.head.inner_at(place) - place.length());
+            if let Some(feel) = &self.feels[hand] {
+                feel.borrow_mut().tool(object);
+            }
+        } else if object.geometry.as_volume().is_some() {
+            self.feels.iter().flatten().for_each(|feel| feel.borrow_mut().bone(object));
         }
         self.renderer.draw(object);
     }
 
     fn swap(&mut self, frame: u64) {
         self.score.frame();
+        self.feels.iter().flatten().for_each(|feel| feel.borrow_mut().deliver());
         self.renderer.swap(frame);
     }
 }

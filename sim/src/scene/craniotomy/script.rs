@@ -77,10 +77,11 @@ impl Script {
         }
     }
 
-    /// Posts what the hands do in the frame two after `swapped`. A tool switch is told when it happens.
-    pub(super) fn post(&self, swapped: u64, mailbox: &Mailbox) {
+    /// Posts what the hands do in the frame two after `swapped`. A tool switch is told when it happens. Of a
+    /// hand that is `led` by a device nothing else is told.
+    pub(super) fn post(&self, swapped: u64, led: [bool; 2], mailbox: &Mailbox) {
         let frame = (swapped + AHEAD) as usize;
-        for (tool, cues) in self.tools.into_iter().zip(&self.hands) {
+        for ((tool, cues), led) in self.tools.into_iter().zip(&self.hands).zip(led) {
             let Some(cue) = cues.get(frame) else { continue };
             let before = frame.checked_sub(1).and_then(|before| cues.get(before));
             // Nothing is posted for the first frames: their cues are told with the first that is.
@@ -88,7 +89,7 @@ impl Script {
             if is_first || before.is_none_or(|before| before.instrument != cue.instrument) {
                 mailbox.post(tool, Message::TakeUp(cue.instrument));
             }
-            if is_first || before != Some(cue) {
+            if !led && (is_first || before != Some(cue)) {
                 mailbox.post(tool, Message::Device(cue.sample));
             }
         }
@@ -155,7 +156,7 @@ mod tests {
         let mut told = Vec::new();
         for swapped in 0..script.frames() {
             let mailbox = Mailbox::new();
-            script.post(swapped, &mailbox);
+            script.post(swapped, [false; 2], &mailbox);
             mailbox.take(swapped + AHEAD, |to: ObjectId, message| {
                 let switch = matches!(message, Message::TakeUp(_));
                 told.push((swapped + AHEAD, to.0, switch));
