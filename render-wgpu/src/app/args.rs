@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dualframe_sim::blocking::{Blocking, Grain};
+use dualframe_sim::device::thread::{MAX_RATE, RATE};
 use dualframe_sim::executor::{Entry, ExecutorKind, MAX_THREADS};
 use dualframe_sim::experiment::Experiment;
 use dualframe_sim::experiment::plan::Plan;
@@ -257,6 +258,9 @@ pub(super) struct CraniotomyArgs {
     /// Write the computed tomography as it is after the operation, as NIfTI
     #[arg(long, value_name = "FILE.nii.gz")]
     pub(super) save: Option<PathBuf>,
+    #[arg(long, value_name = "HZ", default_value_t = RATE, value_parser = parse_rate,
+          help = format!("How often a second the haptic loops of a window's hands tick, 1 to {MAX_RATE}"))]
+    pub(super) haptic_rate: f64,
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_FRAMES),
           help = format!("Number of frames, 1 to {MAX_FRAMES}; if not given, the operation's own, or in a \
                           window until it is closed"))]
@@ -265,6 +269,11 @@ pub(super) struct CraniotomyArgs {
     pub(super) way: Way,
     #[command(flatten)]
     pub(super) products: Products,
+}
+
+fn parse_rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate| (1.0..=MAX_RATE).contains(rate));
+    rate.ok_or_else(|| format!("not a number from 1 to {MAX_RATE}"))
 }
 
 fn parse_step(text: &str) -> Result<Step, String> {

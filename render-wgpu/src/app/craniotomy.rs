@@ -4,23 +4,26 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 use std::sync::Arc;
+use std::thread;
 
 use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_sim::behavior::Bone;
 use dualframe_sim::blocking::Grain;
+use dualframe_sim::device::link::{SimulationEnd, ToolState};
 use dualframe_sim::executor::FrameRecord;
 use dualframe_sim::geometry::{Bounds, Volume};
 use dualframe_sim::image;
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::render::{NullRenderer, Renderer};
 use dualframe_sim::scene::Scene;
-use dualframe_sim::scene::craniotomy::{LOOK_FRAMES, Operation, SKULL, Step, TIME_STEP};
+use dualframe_sim::scene::craniotomy::{LOOK_FRAMES, Operation, SKULL, Step, TIME_STEP, TOOLS};
 use dualframe_sim::timeline::Timeline;
 use glam::Vec3;
 
 use super::AllocationCounter;
 use super::args::CraniotomyArgs;
+use super::haptics::{Cells, Each, Loops};
 use super::measure::Measure;
 use super::outputs::{self, Outputs};
 use super::particles::{RunError, SHOWN_SPANS, TRACED_SPANS, progress_bar};
@@ -44,18 +47,36 @@ pub(super) fn run(
     count: AllocationCounter<'_>,
     note: &dyn Fn(&str),
 ) -> Result<Report, RunError> {
+    let scene = patient.build(args.way.simd())?;
+    let places = TOOLS.map(|tool| scene.objects[tool.0 as usize].center());
+    let cells = &mut Cells::new(places);
+    // Haptic loops end with it.
+    thread::scope(|scope| {
+        let what = (args, patient, outputs);
+        run_beside(|| Ok(cells.start(scope, args.haptic_rate)?), scene, what, count, note)
+    })
+}
+
+/// Operates on a scene beside haptic loops, which `start` starts where a person operates.
+fn run_beside<'c>(
+    start: impl FnOnce() -> Result<Loops<'c, 'c>, RunError>,
+    scene: Scene,
+    (args, patient, outputs): (&CraniotomyArgs, &Patient, &Outputs),
+    count: AllocationCounter<'_>,
+    note: &dyn Fn(&str),
+) -> Result<Report, RunError> {
     let settings = args.way.settings(Grain::Pairwise);
     let is_traced = outputs.trace.is_some();
     let spans = if is_traced { TRACED_SPANS } else { SHOWN_SPANS };
     // One more for whoever renders beside rayon's workers.
     let workers = settings.threads.max(most_threads()) + 1;
     let timeline = Arc::new(Timeline::new(workers, spans));
-    let at_hand = CraniotomyAtHand::new(args, patient);
+    let at_hand = || Ok(CraniotomyAtHand::begin(args, patient, start()?));
     let how = (&args.way, &args.products);
     let window = Session::open(at_hand, how, TIME_STEP, &timeline, note)?;
     let is_watched = window.is_some() || is_traced;
     let manage = |scene| manage(scene, settings, is_watched.then_some(&timeline));
-    let manager = manage(patient.build(args.way.simd())?)?;
+    let manager = manage(scene)?;
     let recording = Recording::begin(outputs.record.as_ref(), patient.spec(), &manager)?;
     let (manager, surgery, measure) = match window {
         Some(window) => {
@@ -93,13 +114,13 @@ fn manage(
 }
 
 /// Runs without a window: a script operates.
-fn run_unwatched<'c>(
+fn run_unwatched<'c, 'h>(
     args: &CraniotomyArgs,
     patient: &Patient,
     outputs: &Outputs,
     (mut manager, mut recording, manage): (VeManager, Recording<'_>, Manage<'_>),
     count: AllocationCounter<'c>,
-) -> Result<(VeManager, Surgery, Measure<'c>), RunError> {
+) -> Result<(VeManager, Surgery<'h>, Measure<'c>), RunError> {
     let mut surgery = Surgery::new(patient, Some(args.step.unwrap_or(Step::All)));
     let frames = args.frames.unwrap_or_else(|| surgery.frames());
     let look = |quality| look(surgery.region(), quality);
@@ -132,17 +153,30 @@ fn run_unwatched<'c>(
 }
 
 /// An operation under way.
-pub(super) struct Surgery {
-    operation: Operation,
+pub(super) struct Surgery<'c> {
+    operation: Operation<'c>,
     /// How far a script operates.
     step: Option<Step>,
     /// Pieces of bone that came free.
     pieces: usize,
+    /// What the hands' haptic loops last said, where some are linked.
+    pub(super) devices: Each<Option<ToolState>>,
 }
 
-impl Surgery {
+impl<'c> Surgery<'c> {
     pub(super) fn new(patient: &Patient, step: Option<Step>) -> Self {
-        Self { operation: Operation::new(Arc::clone(&patient.head), step), step, pieces: 0 }
+        let operation = Operation::new(Arc::clone(&patient.head), step);
+        Self { operation, step, pieces: 0, devices: Default::default() }
+    }
+
+    /// From now on the hands are where their devices are.
+    pub(super) fn link(&mut self, ends: Each<SimulationEnd<'c>>) {
+        (0..).zip(ends).for_each(|(hand, end)| self.operation.link(hand, end));
+    }
+
+    /// The ends of the loops that the hands were linked with.
+    pub(super) fn unlink(&mut self) -> Each<Option<SimulationEnd<'c>>> {
+        self.operation.unlink()
     }
 
     /// The frames that the script takes; none without a script.
@@ -177,6 +211,7 @@ impl Surgery {
             on_frame(record);
         };
         recording.run(&mut manager, frames.min(until_look), &mut watch, &mut on_frame)?;
+        self.devices = [0, 1].map(|hand| hands.device(hand));
         let (manager, freed) = self.operation.look(manager, manage)?;
         if freed > 0 {
             recording.objects(&manager)?;
@@ -191,6 +226,7 @@ impl Surgery {
             pieces: self.pieces,
             bone_removed_mm3: removed(manager) * 1e9,
             score: self.score().into(),
+            haptics: self.devices.iter().flatten().map(Into::into).collect(),
         }
     }
 }

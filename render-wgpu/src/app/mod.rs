@@ -3,6 +3,7 @@
 mod args;
 mod craniotomy;
 mod experiment;
+mod haptics;
 mod measure;
 mod outputs;
 mod particles;

@@ -8,6 +8,7 @@ use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::error::GraphicsError;
 use dualframe_render_wgpu::look::Look;
 use dualframe_sim::blocking::Grain;
+use dualframe_sim::device::thread::LoopError;
 use dualframe_sim::executor::{ExecutorError, ExecutorKind, FrameRecord};
 use dualframe_sim::image::FileError;
 use dualframe_sim::manager::{Settings, VeManager};
@@ -52,6 +53,8 @@ pub(super) enum RunError {
     #[error(transparent)]
     Record(#[from] RecordError),
     #[error(transparent)]
+    Haptics(#[from] LoopError),
+    #[error(transparent)]
     Operation(#[from] BuildError),
     #[error("the image cannot be brought up to date")]
     Drilled(#[from] HeadError),
@@ -85,7 +88,8 @@ pub(super) fn run(
     let timeline = Arc::new(Timeline::new(workers, spans));
     let how = (&args.way, &args.products);
     let time_step = ParticleScene::TIME_STEP;
-    let window = Session::open(ParticlesAtHand::new(args), how, time_step, &timeline, note)?;
+    let at_hand = || Ok(ParticlesAtHand::begin(args));
+    let window = Session::open(at_hand, how, time_step, &timeline, note)?;
     let mut manager = VeManager::new(build(args)?, settings)?;
     let spec = scene_of(args, args.objects);
     let recording = Recording::begin(outputs.record.as_ref(), &spec, &manager)?;

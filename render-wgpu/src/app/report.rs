@@ -10,6 +10,7 @@ use dualframe_sim::scene::craniotomy;
 use dualframe_sim::simd::Simd;
 use serde::{Serialize, Serializer};
 
+use super::haptics::HapticsReport;
 use super::measure::Measure;
 use super::outputs;
 
@@ -53,6 +54,8 @@ pub(super) struct OperationReport {
     /// Bone that was drilled away, in cubic millimetres of full bone.
     pub(super) bone_removed_mm3: f64,
     pub(super) score: ScoreReport,
+    /// Of the hands' haptic loops, where a person operated.
+    pub(super) haptics: Vec<HapticsReport>,
 }
 
 /// What educators measure.
@@ -251,7 +254,7 @@ impl Report {
 
 impl OperationReport {
     fn lines(&self, out: &mut impl Write) -> std::io::Result<()> {
-        let Self { step, pieces, bone_removed_mm3, score } = self;
+        let Self { step, pieces, bone_removed_mm3, score, .. } = self;
         writeln!(out, "{step}: {bone_removed_mm3:.1} mm³ of bone removed, {pieces} pieces free")?;
         writeln!(
             out,

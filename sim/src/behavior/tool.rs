@@ -73,6 +73,14 @@ pub struct Work {
     pub turns: bool,
 }
 
+impl Work {
+    /// All that pushes and pulls it, in newtons.
+    #[must_use]
+    pub fn force(&self) -> Vec3 {
+        self.bone + self.tissue + self.held
+    }
+}
+
 /// A tool that follows a device: a rigid shape whose origin is its tip, its handle along +z.
 ///
 /// Where the device is comes as [`Message::Device`], a tool switch as [`Message::TakeUp`]; the first

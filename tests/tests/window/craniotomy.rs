@@ -66,6 +66,11 @@ fn a_hand_cuts_and_drills() {
     assert_eq!(untouched["bone_removed_mm3"], 0.0);
     assert!(report["bone_removed_mm3"].as_f64() > Some(1.0), "{}", report["bone_removed_mm3"]);
     assert!(report["score"]["drilling_seconds"].as_f64() > Some(0.1), "{}", report["score"]);
+    for hand in report["haptics"].as_array().expect("a list") {
+        assert!(hand["ticks"].as_u64() > Some(1_000), "{hand}");
+        assert!(hand["models"].as_u64() > Some(10), "{hand}");
+    }
+    assert!(report["haptics"][1]["largest_step_n"].as_f64() > Some(0.0), "the drill is felt");
     let replayed = replayed(&recording, &json);
     for key in ["frames", "state_hash"] {
         assert_eq!(replayed[key], report[key], "{key}");

@@ -24,7 +24,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use dualframe_render_wgpu::camera::Camera;
-use dualframe_render_wgpu::error::GraphicsError;
 use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::{ExecutorKind, FrameRecord};
@@ -61,9 +60,6 @@ pub(super) trait Scenario {
 
     /// Its usual broad phase.
     const GRAIN: Grain;
-
-    /// The hand at the beginning.
-    fn hand(&self) -> Self::Hand;
 
     /// What it looks like, and from where it is seen at first.
     fn look(&self, quality: Quality) -> (Look, Camera);
@@ -102,31 +98,33 @@ pub(super) struct Session<'a, S: Scenario> {
 }
 
 impl<'a, S: Scenario> Session<'a, S> {
-    /// Opens a window, where one is wanted and possible.
+    /// Opens a window, where one is wanted and possible, of a scenario and a hand that are made
+    /// for it.
     ///
     /// # Errors
-    /// No display, no window, no adapter that can draw to it, where one was asked for.
+    /// No display, no window, no adapter that can draw to it, where one was asked for; what `make` says.
     pub(super) fn open(
-        scenario: S,
+        make: impl FnOnce() -> Result<(S, S::Hand), RunError>,
         (way, products): (&'a Way, &Products),
         time_step: f32,
         timeline: &Arc<Timeline>,
         note: &'a dyn Fn(&str),
-    ) -> Result<Option<Self>, GraphicsError> {
+    ) -> Result<Option<Self>, RunError> {
         if !products.prefers_window() {
             return Ok(None);
         }
+        let (scenario, hand) = make()?;
         let controls = Controls::new(way);
         let shown = Shown {
             size: products.size,
             time_step: Duration::from_secs_f32(time_step),
             timeline: Arc::clone(timeline),
-            hand: scenario.hand(),
+            hand,
         };
         let look = |quality| scenario.look(quality);
         match View::open(shown, look, products.adapter.as_deref(), controls) {
             Ok(view) => Ok(Some(Self { scenario, view, applied: controls, way, note })),
-            Err(error) if products.window => Err(error),
+            Err(error) if products.window => Err(error.into()),
             Err(error) => {
                 note(&format!(
                     "running without a window, since {error}; --picture FILE.png draws without one"

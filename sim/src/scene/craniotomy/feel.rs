@@ -68,6 +68,10 @@ impl<'c> Feel<'c> {
         Self { end, past, tool, proxies, grasp: Vec3::ZERO, edge }
     }
 
+    pub(super) fn into_end(self) -> SimulationEnd<'c> {
+        self.end
+    }
+
     /// The device at the last swap; none as long as its loop said nothing.
     pub(super) fn device(&self) -> Option<&ToolState> {
         self.past.back()
@@ -125,7 +129,7 @@ impl<'c> Feel<'c> {
             self.past.pop_front();
         }
         let mut sample = self.device()?.sample;
-        if !self.tool.is_some_and(|tool| tool.push.is_some()) {
+        if self.tool.is_none_or(|tool| tool.push.is_none()) {
             // What is blunt stays outside; a drill finds its own way.
             for (_, proxy) in &self.proxies {
                 sample.position = proxy.held_out(sample.position);

@@ -62,6 +62,11 @@ impl<'c> Operation<'c> {
         }
     }
 
+    /// Takes the haptic loops' ends back: hands are scripted again, and loops feel nothing.
+    pub fn unlink(&mut self) -> [Option<SimulationEnd<'c>>; 2] {
+        std::mem::take(&mut self.feels).map(|feel| feel.map(|feel| feel.into_inner().into_end()))
+    }
+
     /// The frames that the script takes.
     #[must_use]
     pub fn frames(&self) -> u64 {

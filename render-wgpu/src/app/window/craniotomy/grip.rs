@@ -3,6 +3,9 @@
 use std::sync::Arc;
 
 use dualframe_sim::behavior::{Instrument, Tool};
+use dualframe_sim::device::DeviceSample;
+use dualframe_sim::device::link::ToolState;
+use dualframe_sim::device::mouse::MouseInput;
 use dualframe_sim::mailbox::Mailbox;
 use dualframe_sim::message::Message;
 use dualframe_sim::object::Object;
@@ -13,6 +16,7 @@ use glam::Vec3;
 
 use super::held::{Goal, Held};
 use super::panel;
+use crate::app::haptics::Each;
 use crate::app::window::controls::Controls;
 use crate::app::window::hand::{Aim, Hand, Marks};
 
@@ -26,10 +30,22 @@ const CRANIOTOMY: Color32 = Color32::from_rgb(40, 150, 90);
 /// Half the length of the cross on the planned burr hole, in metres; usually 5 mm.
 const BURR_HOLE: f32 = 0.005;
 
+/// The devices that the hands hold.
+pub(super) struct Devices<'c> {
+    /// Where they are at the beginning, in metres.
+    pub(super) places: Each<Vec3>,
+    pub(super) inputs: Each<MouseInput<'c>>,
+    /// How their loops are scheduled.
+    pub(super) priority: String,
+    /// What their loops last said, where they are linked.
+    pub(super) states: Each<Option<ToolState>>,
+}
+
 /// The two hands, one of which the mouse leads.
-pub(in crate::app) struct ToolGrip {
+pub(in crate::app) struct ToolGrip<'c> {
     head: Arc<Head>,
-    pub(super) hands: [Held; TOOLS.len()],
+    pub(super) devices: Devices<'c>,
+    pub(super) hands: Each<Held>,
     /// The hand that the mouse leads.
     pub(super) active: usize,
     /// From where, and in which direction, one looks for what is under the mouse.
@@ -45,10 +61,11 @@ pub(in crate::app) struct ToolGrip {
     pub(super) is_planned: bool,
 }
 
-impl ToolGrip {
-    pub(super) fn new(head: Arc<Head>, is_free: bool) -> Self {
+impl<'c> ToolGrip<'c> {
+    pub(super) fn new(head: Arc<Head>, devices: Devices<'c>, is_free: bool) -> Self {
         Self {
             head,
+            devices,
             hands: Default::default(),
             active: 0,
             sight: None,
@@ -85,13 +102,16 @@ impl ToolGrip {
     }
 }
 
-impl Hand for ToolGrip {
+impl Hand for ToolGrip<'_> {
     const HELP: &'static str = "left: use the instrument · 1 to 7: take up another · x: other hand, \
                                 what is held stays held";
 
     fn forget(&mut self) {
-        let is_free = self.is_free;
-        *self = Self::new(Arc::clone(&self.head), is_free);
+        self.hands = Default::default();
+        (self.active, self.chosen) = (0, None);
+        for (input, &place) in self.devices.inputs.iter_mut().zip(&self.devices.places) {
+            input.set(DeviceSample::at(place));
+        }
     }
 
     fn press(&mut self, aim: &Aim<'_>) {
@@ -126,7 +146,8 @@ impl Hand for ToolGrip {
         if let (Some(hand), Some(tool)) =
             (TOOLS.iter().position(|&tool| tool == object.id()), Tool::of(object))
         {
-            self.hands[hand].note(tool, object.center(), self.is_free);
+            let sample = self.hands[hand].note(tool, object.center(), self.is_free);
+            sample.into_iter().for_each(|sample| self.devices.inputs[hand].set(sample));
         } else if let Some((eye, direction)) = self.sight {
             let nearest = self.distance.unwrap_or(SIGHT);
             self.distance = object.geometry.cast(eye, direction, nearest).or(self.distance);
@@ -140,11 +161,17 @@ impl Hand for ToolGrip {
             return;
         }
         self.take_up(aim.mailbox);
-        let side = aim.painter.camera.axes().0 * if self.active == 0 { 1.0 } else { -1.0 };
-        let inner = |place: Vec3| self.head.inner_at(place);
-        let goal = Goal { under, side, inner: &inner, drawn: &|anchor| aim.at_depth_of(anchor) };
-        if let Some(sample) = self.hands[self.active].next(&goal) {
-            aim.mailbox.post(TOOLS[self.active], Message::Device(sample));
+        let Self { head, devices, hands, active, .. } = self;
+        let inner = |place: Vec3| head.inner_at(place);
+        let right = aim.painter.camera.axes().0;
+        let sides = [right, -right];
+        for (hand, held) in hands.iter_mut().enumerate() {
+            // The other hand goes aside, unless it holds something.
+            let under = if hand == *active { under } else { Some(devices.places[hand]) };
+            let drawn = |anchor| aim.at_depth_of(anchor);
+            let goal = Goal { under, side: sides[hand], inner: &inner, drawn: &drawn };
+            let sample = held.next(&goal);
+            sample.into_iter().for_each(|sample| devices.inputs[hand].set(sample));
         }
     }
 

@@ -71,13 +71,16 @@ pub(super) struct Goal<'a> {
 }
 
 impl Held {
-    /// Notes what the tool is and does; a hand that is not `free` is where the tool is.
-    pub(super) fn note(&mut self, tool: &Tool, tip: Vec3, is_free: bool) {
+    /// Notes what the tool is and does. A hand that is not free goes where the tool is: what its device
+    /// says then.
+    pub(super) fn note(&mut self, tool: &Tool, tip: Vec3, is_free: bool) -> Option<DeviceSample> {
         self.work = tool.work();
-        if self.sample.is_none() || !is_free {
-            self.instrument = tool.instrument();
-            self.sample = Some(DeviceSample::at(tip));
+        if is_free && self.sample.is_some() {
+            return None;
         }
+        self.instrument = tool.instrument();
+        self.sample = Some(DeviceSample::at(tip));
+        self.sample
     }
 
     pub(super) fn is_pressed(&self) -> bool {

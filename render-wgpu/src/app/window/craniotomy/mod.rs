@@ -9,70 +9,98 @@ use std::sync::Arc;
 use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_sim::blocking::Grain;
+use dualframe_sim::device::link::SimulationEnd;
+use dualframe_sim::device::thread::HapticThread;
 use dualframe_sim::executor::FrameRecord;
 use dualframe_sim::manager::VeManager;
 use dualframe_sim::scene::Scene;
 
-use self::grip::ToolGrip;
+use self::grip::{Devices, ToolGrip};
 use super::view::View;
 use super::{Manage, Scenario};
 use crate::app::args::CraniotomyArgs;
 use crate::app::craniotomy::{self, Surgery};
+use crate::app::haptics::{Each, Loops};
 use crate::app::particles::RunError;
 use crate::app::recording::Recording;
 use crate::app::scenes::Patient;
 
 /// A craniotomy in a window.
-pub(in crate::app) struct CraniotomyAtHand<'a> {
+pub(in crate::app) struct CraniotomyAtHand<'a, 'c> {
     args: &'a CraniotomyArgs,
     patient: &'a Patient,
-    pub(in crate::app) surgery: Surgery,
+    pub(in crate::app) surgery: Surgery<'c>,
+    /// As long as a script moves the tools.
+    unlinked: Option<Each<SimulationEnd<'c>>>,
+    // Loops that are dropped end.
+    _threads: Each<HapticThread<'c>>,
 }
 
-impl<'a> CraniotomyAtHand<'a> {
-    pub(in crate::app) fn new(args: &'a CraniotomyArgs, patient: &'a Patient) -> Self {
-        Self { args, patient, surgery: Surgery::new(patient, args.step) }
+impl<'a, 'c> CraniotomyAtHand<'a, 'c> {
+    /// It, and the hands that operate.
+    pub(in crate::app) fn begin(
+        args: &'a CraniotomyArgs,
+        patient: &'a Patient,
+        loops: Loops<'c, 'c>,
+    ) -> (Self, ToolGrip<'c>) {
+        let Loops { threads, places, inputs, ends } = loops;
+        let surgery = Surgery::new(patient, args.step);
+        let [priority, _] = threads.each_ref().map(|thread| thread.priority().to_string());
+        let devices = Devices { places, inputs, priority, states: Default::default() };
+        let hand = ToolGrip::new(Arc::clone(&patient.head), devices, surgery.frames() == 0);
+        (Self { args, patient, surgery, unlinked: Some(ends), _threads: threads }, hand)
+    }
+
+    /// Whether no script moves the tools in the frames that come.
+    fn is_free(&self, manager: &VeManager) -> bool {
+        manager.frame() >= self.surgery.frames()
     }
 }
 
-impl Scenario for CraniotomyAtHand<'_> {
-    type Hand = ToolGrip;
+impl<'c> Scenario for CraniotomyAtHand<'_, 'c> {
+    type Hand = ToolGrip<'c>;
 
     const GRAIN: Grain = Grain::Pairwise;
-
-    fn hand(&self) -> ToolGrip {
-        ToolGrip::new(Arc::clone(&self.patient.head), self.surgery.frames() == 0)
-    }
 
     fn look(&self, quality: Quality) -> (Look, Camera) {
         craniotomy::look(self.surgery.region(), quality)
     }
 
-    fn build(&mut self, _hand: &ToolGrip) -> Result<Scene, RunError> {
+    fn build(&mut self, _hand: &ToolGrip<'c>) -> Result<Scene, RunError> {
+        if let [Some(one), Some(other)] = self.surgery.unlink() {
+            self.unlinked = Some([one, other]);
+        }
         self.surgery = Surgery::new(self.patient, self.args.step);
         Ok(self.patient.build(self.args.way.simd())?)
     }
 
     fn apply(
         &mut self,
-        _hand: &ToolGrip,
-        _manager: &mut VeManager,
+        _hand: &ToolGrip<'c>,
+        manager: &mut VeManager,
         _recording: &mut Recording<'_>,
     ) -> Result<(), RunError> {
+        // By now the devices are where the tools are.
+        if self.is_free(manager)
+            && let Some(ends) = self.unlinked.take()
+        {
+            self.surgery.link(ends);
+        }
         Ok(())
     }
 
     fn advance(
         &mut self,
-        view: &mut View<ToolGrip>,
+        view: &mut View<ToolGrip<'c>>,
         manager: VeManager,
         recording: &mut Recording<'_>,
         frames: u64,
         host: (&mut dyn FnMut(&FrameRecord), Manage<'_>),
     ) -> Result<VeManager, RunError> {
         let manager = self.surgery.advance(manager, recording, frames, view, host)?;
-        view.hand.is_free = manager.frame() >= self.surgery.frames();
+        view.hand.is_free = self.is_free(&manager);
         view.hand.score = self.surgery.score();
+        view.hand.devices.states = self.surgery.devices;
         Ok(manager)
     }
 }

@@ -1,6 +1,7 @@
 //! What the overlay shows of an operation.
 
 use dualframe_sim::behavior::Instrument;
+use dualframe_sim::device::link::ToolState;
 use dualframe_sim::scene::craniotomy::Report;
 use egui::{Checkbox, Grid, Ui};
 
@@ -10,10 +11,12 @@ use crate::app::window::controls::Controls;
 /// The hands' names, in their order.
 const HANDS: [&str; 2] = ["right", "left"];
 
-pub(super) fn show(ui: &mut Ui, grip: &mut ToolGrip, controls: &mut Controls) {
+pub(super) fn show(ui: &mut Ui, grip: &mut ToolGrip<'_>, controls: &mut Controls) {
     instruments(ui, grip);
     ui.separator();
     score(ui, &grip.score);
+    ui.separator();
+    haptics(ui, grip);
     ui.horizontal(|ui| {
         ui.add(Checkbox::new(&mut grip.is_planned, "show the plan"));
         if ui.button("Begin anew").clicked() {
@@ -22,7 +25,7 @@ pub(super) fn show(ui: &mut Ui, grip: &mut ToolGrip, controls: &mut Controls) {
     });
 }
 
-fn instruments(ui: &mut Ui, grip: &mut ToolGrip) {
+fn instruments(ui: &mut Ui, grip: &mut ToolGrip<'_>) {
     if !grip.is_free {
         ui.label("a script operates");
     }
@@ -32,7 +35,7 @@ fn instruments(ui: &mut Ui, grip: &mut ToolGrip) {
                 grip.change_hands();
             }
             let held = &grip.hands[hand];
-            let force = (held.work.bone + held.work.tissue).length();
+            let force = held.work.force().length();
             let use_of_it = if held.is_used() { ", in use" } else { "" };
             ui.label(format!("{}{use_of_it}: {force:.1} N", held.instrument.name()));
             ui.end_row();
@@ -66,4 +69,16 @@ fn score(ui: &mut Ui, score: &Report) {
         let (tears, length) = (score.dural_tears, millimetres(score.dural_tear_length));
         line("dural tears", format!("{tears}, {length:.1} mm"));
     });
+}
+
+fn haptics(ui: &mut Ui, grip: &ToolGrip<'_>) {
+    ui.label(format!("haptic loops: {}", grip.devices.priority));
+    let Some(state) = &grip.devices.states[grip.active] else { return };
+    let ToolState { ticks, forces, wrench, .. } = state;
+    let (late, latest) = (100.0 * ticks.late_share(), ticks.latest * 1e3);
+    ui.label(format!("{} ticks, {late:.2} % late, at most {latest:.2} ms", ticks.due));
+    let (force, age) = (wrench.force.length(), forces.age * 1e3);
+    ui.label(format!("force {force:.2} N, {age:.0} ms old; {:.3} W", forces.power));
+    let (error, step) = (forces.error_rms(), forces.largest_step);
+    ui.label(format!("interpolated to {error:.2} N; steps of {step:.2} N at most"));
 }

@@ -35,8 +35,10 @@ pub(in crate::app) struct ParticlesAtHand<'a> {
 }
 
 impl<'a> ParticlesAtHand<'a> {
-    pub(in crate::app) fn new(args: &'a Particles) -> Self {
-        Self { args, applied: Physics::new(args), objects: args.objects }
+    /// They, and the hand that pulls at them.
+    pub(in crate::app) fn begin(args: &'a Particles) -> (Self, Grip) {
+        let applied = Physics::new(args);
+        (Self { args, applied, objects: args.objects }, Grip::new(applied))
     }
 
     /// Posts a message to every particle.
@@ -50,10 +52,6 @@ impl Scenario for ParticlesAtHand<'_> {
     type Hand = Grip;
 
     const GRAIN: Grain = Grain::Spatial;
-
-    fn hand(&self) -> Grip {
-        Grip::new(self.applied)
-    }
 
     fn look(&self, quality: Quality) -> (Look, Camera) {
         let room = particles::scene_of(self.args, self.objects).room();
