@@ -143,10 +143,10 @@ impl Hand for ToolGrip<'_> {
     }
 
     fn see(&mut self, object: &Object) {
-        if let (Some(hand), Some(tool)) =
-            (TOOLS.iter().position(|&tool| tool == object.id()), Tool::of(object))
-        {
-            let sample = self.hands[hand].note(tool, object.center(), self.is_free);
+        let hand = TOOLS.iter().position(|&tool| tool == object.id());
+        let tool = Tool::of(object).zip(object.geometry.as_rigid());
+        if let (Some(hand), Some(tool)) = (hand, tool) {
+            let sample = self.hands[hand].note(tool, self.is_free);
             sample.into_iter().for_each(|sample| self.devices.inputs[hand].set(sample));
         } else if let Some((eye, direction)) = self.sight {
             let nearest = self.distance.unwrap_or(SIGHT);

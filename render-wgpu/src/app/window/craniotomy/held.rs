@@ -2,6 +2,7 @@
 
 use dualframe_sim::behavior::{Instrument, Tool, Work};
 use dualframe_sim::device::DeviceSample;
+use dualframe_sim::geometry::Rigid;
 use dualframe_sim::scene::craniotomy::TIME_STEP;
 use glam::{Quat, Vec3};
 
@@ -37,7 +38,7 @@ enum Button {
     /// It is down. Where it went down: the anchor, which is drawn with the mouse, and how far from the mouse
     /// it is.
     Down { anchor: Vec3, offset: Vec3 },
-    /// It was left down when the mouse went to the other hand.
+    /// It was left down, by the mouse that went to the other hand or by a script.
     Left,
 }
 
@@ -71,15 +72,22 @@ pub(super) struct Goal<'a> {
 }
 
 impl Held {
-    /// Notes what the tool is and does. A hand that is not free goes where the tool is: what its device
-    /// says then.
-    pub(super) fn note(&mut self, tool: &Tool, tip: Vec3, is_free: bool) -> Option<DeviceSample> {
+    /// Notes what the tool is and does. A hand that is not free is as the tool is: what its device says
+    /// then.
+    pub(super) fn note(
+        &mut self,
+        (tool, rigid): (&Tool, &Rigid),
+        is_free: bool,
+    ) -> Option<DeviceSample> {
         self.work = tool.work();
         if is_free && self.sample.is_some() {
             return None;
         }
         self.instrument = tool.instrument();
-        self.sample = Some(DeviceSample::at(tip));
+        self.button = if tool.is_pressed() { Button::Left } else { Button::Up };
+        let (position, orientation) = (rigid.pose.translation, rigid.pose.rotation);
+        self.sample =
+            Some(DeviceSample { position, orientation, buttons: u32::from(self.is_used()) });
         self.sample
     }
 
