@@ -1,25 +1,33 @@
 //! How punctual the haptic loop is: the share of ticks at 1 kHz that begin more than half a millisecond
-//! late, while a pipeline has every core busy, and beside it what an empty loop at that rate sees on the
-//! same machine.
+//! late, while a pipeline has every core busy, with particles and with a craniotomy in which the loop leads a
+//! tool; and beside it what an empty loop at that rate sees on the same machine.
 //!
 //! The loops take turns, so that a bad phase of the machine meets all of them. With `--test`, one round of
 //! a tenth of a second.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{scope, sleep, spawn};
 use std::time::{Duration, Instant};
 
+use dualframe_sim::behavior::Instrument;
+use dualframe_sim::blocking::Grain;
+use dualframe_sim::device::DeviceSample;
 use dualframe_sim::device::figures::{LATE, Ticks};
 use dualframe_sim::device::law::ForceSettings;
 use dualframe_sim::device::link::{HapticLink, ToolState};
-use dualframe_sim::device::motion::Motion;
+use dualframe_sim::device::motion::{Keyframe, Motion};
 use dualframe_sim::device::operator::{Hand, SimulatedDevice};
 use dualframe_sim::device::priority::Priority;
 use dualframe_sim::device::proxy::{ContactStiffness, Proxy, Surface};
 use dualframe_sim::device::thread::{HapticThread, RATE};
+use dualframe_sim::executor::FrameRecord;
 use dualframe_sim::manager::{Settings, VeManager};
+use dualframe_sim::message::Message;
 use dualframe_sim::render::NullRenderer;
-use dualframe_sim::scene::ParticleScene;
+use dualframe_sim::scene::craniotomy::{self, Operation, TOOLS};
+use dualframe_sim::scene::head::{Entry, Head};
+use dualframe_sim::scene::{ParticleScene, Scene};
 use glam::Vec3;
 
 /// Particles of the environment that keeps the cores busy: the paper's usual number.
@@ -30,34 +38,55 @@ const WORKERS: usize = 2;
 fn main() {
     let test = std::env::args().any(|argument| argument == "--test");
     let (rounds, seconds) = if test { (1, 0.1) } else { (5, 4.0) };
-    let settings = Settings { threads: WORKERS, ..Settings::default() };
-    let scene = ParticleScene::new(PARTICLES).build().expect("so many are allowed");
-    let mut manager = VeManager::new(scene, settings).expect("two workers are allowed");
-    let [mut idle, mut idle_first, mut busy, mut busy_first, mut haptic] = [Sum::default(); 5];
+    let particles = ParticleScene::new(PARTICLES).build().expect("so many are allowed");
+    let mut particles = manager(particles, Grain::default());
+    let head = Arc::new(Head::synthetic().expect("the synthetic head"));
+    let craniotomy = craniotomy::build(&head).expect("a sound scene");
+    let mut craniotomy = manager(craniotomy, Grain::Pairwise);
+    let mut sums = [Sum::default(); 8];
     let mut last = None;
     for _ in 0..rounds {
-        idle.add(empty(seconds, false));
-        idle_first.add(empty(seconds, true));
-        busy.add(beside(&mut manager, || empty(seconds, false)));
-        busy_first.add(beside(&mut manager, || empty(seconds, true)));
-        let tool = haptics(&mut manager, seconds);
-        haptic.add(tool.ticks);
-        last = Some(tool);
+        let idle = [empty(seconds, false), empty(seconds, true)];
+        let [beside_particles, beside_craniotomy] = [&mut particles, &mut craniotomy]
+            .map(|load| [false, true].map(|priority| beside(load, || empty(seconds, priority))));
+        let tools = [haptics(&mut particles, seconds), operate(&mut craniotomy, &head, seconds)];
+        let [[a, b], [c, d], [e, f], [g, h]] =
+            [idle, beside_particles, beside_craniotomy, tools.map(|tool| tool.ticks)];
+        sums.iter_mut().zip([a, b, c, d, g, e, f, h]).for_each(|(sum, ticks)| sum.add(ticks));
+        last = Some(tools);
     }
-    println!("haptics: {PARTICLES} particles, {WORKERS} workers, {}", Priority::raise());
-    println!("{:<44} {:>8} {:>12} {:>12}", "loop at 1 kHz", "ticks", "late by 0.5", "latest, ms");
-    idle.print("empty, idle machine");
-    idle_first.print("empty, idle machine, priority if allowed");
-    busy.print("empty, full load");
-    busy_first.print("empty, full load, priority if allowed");
-    haptic.print("haptics, full load, priority if allowed");
-    if let Some(ToolState { forces, .. }) = last {
-        let (age, greatest) = (forces.age * 1e3, forces.greatest_age * 1e3);
-        println!("force age {age:.1} ms, at most {greatest:.1}; {} models", forces.models);
-        let (error, step) = (forces.error_rms(), forces.largest_step);
-        println!("interpolation error {error:.4} N rms; largest step {step:.3} N a tick");
-        println!("power {:.2e} W; least energy {:.2e} J", forces.power, forces.least_absorbed);
+    println!("haptics: {WORKERS} workers, {}", Priority::raise());
+    println!("{:<52} {:>8} {:>12} {:>12}", "loop at 1 kHz", "ticks", "late by 0.5", "latest, ms");
+    let names = [
+        "empty, idle machine",
+        "empty, idle machine, priority if allowed",
+        "empty, 300 particles",
+        "empty, 300 particles, priority if allowed",
+        "haptics, 300 particles, priority if allowed",
+        "empty, craniotomy",
+        "empty, craniotomy, priority if allowed",
+        "haptics, craniotomy, priority if allowed",
+    ];
+    names.into_iter().zip(sums).for_each(|(name, sum)| sum.print(name));
+    for (load, tool) in ["300 particles", "craniotomy"].into_iter().zip(last.into_iter().flatten())
+    {
+        print(load, &tool);
     }
+}
+
+fn manager(scene: Scene, grain: Grain) -> VeManager {
+    let settings = Settings { threads: WORKERS, grain, ..Settings::default() };
+    VeManager::new(scene, settings).expect("two workers are allowed")
+}
+
+/// What a loop said of its forces.
+fn print(load: &str, ToolState { forces, .. }: &ToolState) {
+    println!("{load}:");
+    let (age, greatest) = (forces.age * 1e3, forces.greatest_age * 1e3);
+    println!("  force age {age:.1} ms, at most {greatest:.1}; {} models", forces.models);
+    let (error, step) = (forces.error_rms(), forces.largest_step);
+    println!("  interpolation error {error:.4} N rms; largest step {step:.3} N a tick");
+    println!("  power {:.2e} W; least energy {:.2e} J", forces.power, forces.least_absorbed);
 }
 
 /// The ticks of all rounds.
@@ -75,7 +104,7 @@ impl Sum {
     fn print(self, name: &str) {
         let Self(ticks) = self;
         let (share, latest) = (100.0 * ticks.late_share(), ticks.latest * 1e3);
-        println!("{name:<44} {:>8} {share:>10.3} % {latest:>12.3}", ticks.due);
+        println!("{name:<52} {:>8} {share:>10.3} % {latest:>12.3}", ticks.due);
     }
 }
 
@@ -154,4 +183,42 @@ fn haptics(manager: &mut VeManager, seconds: f64) -> ToolState {
         }
         simulation.tool()
     })
+}
+
+/// The haptic loop in the craniotomy: a hand strokes over the skull with an elevator.
+fn operate(manager: &mut VeManager, head: &Arc<Head>, seconds: f64) -> ToolState {
+    let mut link = HapticLink::new();
+    let (end, simulation) = link.split();
+    let device = SimulatedDevice::new(Hand::FIRM, strokes(head, seconds));
+    let mut operation = Operation::new(Arc::clone(head), None);
+    operation.link(0, simulation);
+    let mailbox = manager.mailbox();
+    mailbox.post(TOOLS[0], Message::TakeUp(Instrument::Elevator));
+    scope(|scope| {
+        let settings = ForceSettings::default();
+        let _thread =
+            HapticThread::spawn(scope, device, end, settings, RATE).expect("a thread is free");
+        let mut renderer = NullRenderer::new();
+        let (hands, mut watch) = operation.parts(&mut renderer);
+        let began = Instant::now();
+        while began.elapsed().as_secs_f64() < seconds {
+            let mut on_frame = |record: &FrameRecord| hands.swapped(record.frame, &mailbox);
+            manager.run(4, &mut watch, &mut on_frame).expect("no table is full");
+        }
+        hands.device(0).expect("it ticked")
+    })
+}
+
+/// Strokes of 20 mm, two a second, at the place of the burr hole, where a hand presses with 4 N.
+fn strokes(head: &Head, seconds: f64) -> Motion {
+    let Entry { point, inward, .. } = head.plan.burr_hole;
+    let aside = inward.any_orthonormal_vector() * 0.01;
+    let ends = (0..=(2.0 * seconds) as u32).map(|number| {
+        let side = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let sample = DeviceSample::at(point + inward * 0.01 + aside * side);
+        Keyframe { time: 0.5 + 0.5 * f64::from(number), sample }
+    });
+    let above = DeviceSample::at(point - inward * 0.02 + aside);
+    let first = Keyframe { time: 0.0, sample: above };
+    Motion::new(std::iter::once(first).chain(ends)).expect("in order")
 }

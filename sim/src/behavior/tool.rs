@@ -170,14 +170,14 @@ impl Tool {
         self.work
     }
 
-    /// How what it works on holds the hand on a drill back whose tip is at `tip`, in metres; none for
-    /// another instrument, and where no bone is touched.
+    /// What joins the hand with a drill that bone holds back; none for another instrument, and where no
+    /// bone is touched.
     #[must_use]
-    pub fn coupling(&self, tip: Vec3) -> Option<Coupling> {
-        self.feed()?.coupling(tip, self.device.position, &self.reaction)
+    pub fn coupling(&self) -> Option<Coupling> {
+        self.feed()?.coupling(&self.reaction)
     }
 
-    /// The stiffness of that hold, in newtons per metre; none for what is no drill.
+    /// Of a drill, the stiffness of what joins it with the hand, in newtons per metre.
     #[must_use]
     pub fn coupling_stiffness(&self) -> Option<f32> {
         self.feed().map(Feed::stiffness)

@@ -15,17 +15,28 @@ pub struct FeedError {
     pub value: f32,
 }
 
-/// What a hand feels of a tool that bone holds back: the spring by which its [`Feed`] pushes the tool on, the
-/// virtual coupling of J. E. Colgate, M. C. Stanley, J. M. Brown, "Issues in the haptic display of tool
-/// use", IROS 1995.
+/// How a hand and a tool that bone holds back pull at each other: the spring by which a [`Feed`] pushes the
+/// tool on, the virtual coupling of J. E. Colgate, M. C. Stanley, J. M. Brown, "Issues in the haptic
+/// display of tool use", IROS 1995.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coupling {
-    /// On the hand, in newtons: against its push, and as strong at most.
-    pub force: Vec3,
-    /// Of the spring, in newtons per metre; usually 5,000.
+    /// Of the spring, in newtons per metre: the strength at [`Feed::REACH`]; usually 5,000.
     pub stiffness: f32,
-    /// The outward normal of the bone, of unit length: a hand that goes out along it is not held.
+    /// The greatest force along the normal, and across it, in newtons; usually 10.
+    pub strength: f32,
+    /// The outward normal of the bone, of unit length. Out along it nothing is held.
     pub normal: Vec3,
+}
+
+impl Coupling {
+    /// The force on a hand that is so far ahead of the tool (metres), in newtons; the opposite is on the
+    /// tool.
+    #[must_use]
+    pub fn force(&self, ahead: Vec3) -> Vec3 {
+        let out = ahead.dot(self.normal);
+        let pull = |way: Vec3| (way * self.stiffness).clamp_length_max(self.strength);
+        -(pull(self.normal * out.min(0.0)) + pull(ahead - self.normal * out))
+    }
 }
 
 /// A hand that pushes a tool towards a place as strongly as it can, by admittance: in contact it moves by
@@ -85,43 +96,36 @@ impl Feed {
     #[must_use]
     pub fn next(&self, place: Vec3, intended: Vec3, reaction: &Reaction, time_step: f32) -> Vec3 {
         let way = intended - place;
-        let Some(normal) = reaction.normal() else {
+        let Some(coupling) = self.coupling(reaction) else {
             return place + way.clamp_length_max(self.free_step);
         };
+        let normal = coupling.normal;
         let out = way.dot(normal);
         let across = way - normal * out;
         if out > 0.0 {
             let leave = normal * out.min(self.free_step);
             return place + leave + across.clamp_length_max(self.contact_step);
         }
-        let force = self.push(normal * out) + self.push(across) + reaction.force;
+        let force = reaction.force - coupling.force(way);
         let step = force * (time_step / self.resistance);
         let back = step.dot(normal).max(0.0);
         let rest = (step - normal * back).clamp_length_max(self.contact_step);
         place + normal * back.min(self.free_step) + rest
     }
 
-    /// The force of a hand that wants to go so far one way, in newtons.
-    fn push(&self, way: Vec3) -> Vec3 {
-        (way * self.stiffness()).clamp_length_max(self.strength)
+    /// What joins the hand with a tool that feels so; none where no bone is touched, for there the tool only
+    /// comes after.
+    #[must_use]
+    pub fn coupling(&self, reaction: &Reaction) -> Option<Coupling> {
+        let Self { strength, .. } = *self;
+        let normal = reaction.normal()?;
+        Some(Coupling { stiffness: self.stiffness(), strength, normal })
     }
 
-    /// The stiffness of the spring by which the hand pushes, in newtons per metre: its strength at
-    /// [`Feed::REACH`].
+    /// The stiffness of a [`Coupling`], in newtons per metre.
     #[must_use]
     pub fn stiffness(&self) -> f32 {
         self.strength / Self::REACH
-    }
-
-    /// What holds the hand back from where it wants the tool (`intended`) if the tool got only to `place`,
-    /// in metres; none where no bone is touched, for there the tool only comes after.
-    #[must_use]
-    pub fn coupling(&self, place: Vec3, intended: Vec3, reaction: &Reaction) -> Option<Coupling> {
-        let normal = reaction.normal()?;
-        let way = intended - place;
-        let out = way.dot(normal);
-        let push = self.push(normal * out.min(0.0)) + self.push(way - normal * out);
-        Some(Coupling { force: -push, stiffness: self.stiffness(), normal })
     }
 
     /// How hard the hand presses the bit on the bone, in newtons: the load that the bone bears, but no

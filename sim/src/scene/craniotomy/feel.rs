@@ -13,13 +13,13 @@ use crate::device::model::LocalModel;
 use crate::device::proxy::{ContactStiffness, Proxy};
 use crate::object::{Object, ObjectId};
 
-/// Swaps after that of a frame's own until a tool has gone where a device was then: none for the swap
-/// before, which is what bone is felt by.
-const MOVED: usize = 1;
-/// Until contacts find it there.
+/// How many swaps before the last one the device was where the contacts of the frame that is drawn found the
+/// tool: what is posted at a swap moves it in the frame after the next, and contacts find it a frame later.
 const TOUCHED: usize = 2;
-/// Until what it holds has been drawn there and has told.
+/// Likewise where the tool was when that which it holds was drawn there, which has told since.
 const HELD: usize = 3;
+/// How far a drill is led beside the device at most, in metres; usually 1 mm.
+const SHIFT: f32 = 0.001;
 /// The stiffness with which the dura is felt, in newtons per metre; usually 200, that of its contact.
 const DURA: f32 = 200.0;
 /// The greatest stiffness with which what is held is felt, in newtons per metre; usually 1,000.
@@ -28,8 +28,14 @@ const HOLD: f32 = 1_000.0;
 const DRAWN: f32 = 0.002;
 /// The force that it takes to cut scalp, in newtons; usually 1.
 const CUTTING: f32 = 1.0;
-/// How far a blade goes until it cuts on, in metres; usually 3 mm: that much skin gives way.
-const GIVES: f32 = 0.003;
+/// How far scalp gives way before a blade cuts on, in metres; usually 3 mm.
+const CUTTING_GIVES: f32 = 0.003;
+/// The coefficient of friction of an instrument on bone; usually 0.2.
+const FRICTION: f32 = 0.2;
+/// How far an instrument gives way on bone before it slides, in metres; usually 0.5 mm. Bone from a CT is
+/// uneven, with radii of some 10 mm, on which a hand that presses without friction swings to and fro, for
+/// the slope that it feels is a frame old; friction over this is stiffer than the force over such a radius.
+const FRICTION_GIVES: f32 = 0.000_5;
 
 /// Joins a haptic loop with a tool.
 ///
@@ -39,16 +45,22 @@ const GIVES: f32 = 0.003;
 #[derive(Debug)]
 pub(super) struct Feel<'c> {
     end: SimulationEnd<'c>,
+    /// The device at the first look in the frame that is being drawn.
+    now: Option<ToolState>,
     /// The device at the last swaps, the last one last.
     past: VecDeque<ToolState>,
     /// The tool as it was drawn last.
     tool: Option<Seen>,
     /// For each volume of bone.
     proxies: Vec<(ObjectId, Proxy)>,
+    /// Where the hand felt the surface of bone, if it touches any.
+    rest: Option<Vec3>,
+    /// By how much a drill in bone is led ahead of the device.
+    shift: Option<Vec3>,
     /// Where the tool was when it took hold.
     grasp: Vec3,
-    /// Where the tissue is that a blade draws along.
-    edge: Option<Vec3>,
+    /// Of a blade in what it cuts, and of the tool on bone.
+    drags: [Drag; 2],
 }
 
 /// What was seen of a tool.
@@ -64,8 +76,9 @@ struct Seen {
 impl<'c> Feel<'c> {
     pub(super) fn new(end: SimulationEnd<'c>) -> Self {
         let past = VecDeque::with_capacity(HELD + 2);
-        let (tool, proxies, edge) = (None, Vec::new(), None);
-        Self { end, past, tool, proxies, grasp: Vec3::ZERO, edge }
+        let (now, tool, proxies, drags) = (None, None, Vec::new(), Default::default());
+        let (rest, shift, grasp) = (None, None, Vec3::ZERO);
+        Self { end, now, past, tool, proxies, rest, shift, grasp, drags }
     }
 
     pub(super) fn into_end(self) -> SimulationEnd<'c> {
@@ -86,13 +99,13 @@ impl<'c> Feel<'c> {
         if work.held == Vec3::ZERO {
             self.grasp = tip;
         }
-        let coupling = tool.coupling(tip);
+        let coupling = tool.coupling();
         self.tool = Some(Seen { tip, work, coupling, push: tool.coupling_stiffness() });
     }
 
     /// The bone, or a piece of it, is this in the frame that is being drawn.
     pub(super) fn bone(&mut self, object: &Object) {
-        let (Some(volume), Some(&device)) = (object.geometry.as_volume(), self.device()) else {
+        let (Some(volume), Some(device)) = (object.geometry.as_volume(), self.look()) else {
             return;
         };
         let Some(Seen { tip, work, coupling, .. }) = self.tool else { return };
@@ -113,29 +126,42 @@ impl<'c> Feel<'c> {
 
     /// A frame is drawn: tells the loop what to exert.
     pub(super) fn deliver(&mut self) {
-        self.cut();
         if let Some(model) = self.model() {
             // A model that is no number is left out, and forces fade if none comes.
             let _ = self.end.deliver(model);
         }
+        self.now = None;
     }
 
     /// The frame was swapped: where the device is that the tool follows, from now on.
     pub(super) fn sample(&mut self) -> Option<DeviceSample> {
-        let now = self.end.tool();
-        let said = now.time > 0.0 && now.fault.is_none();
-        self.past.extend(if said { Some(now) } else { self.device().copied() });
+        let now = self.said().or(self.device().copied());
+        self.past.extend(now);
         if self.past.len() > HELD + 1 {
             self.past.pop_front();
         }
         let mut sample = self.device()?.sample;
-        if self.tool.is_none_or(|tool| tool.push.is_none()) {
-            // What is blunt stays outside; a drill finds its own way.
+        if self.tool.is_some_and(|tool| tool.push.is_some()) {
+            // A drill finds its own way.
+            sample.position += self.shift.unwrap_or_default();
+        } else {
             for (_, proxy) in &self.proxies {
                 sample.position = proxy.held_out(sample.position);
             }
         }
         Some(sample)
+    }
+
+    /// The device now, as far as its loop has said anything that counts.
+    fn said(&mut self) -> Option<ToolState> {
+        let now = self.end.tool();
+        (now.time > 0.0 && now.fault.is_none()).then_some(now)
+    }
+
+    /// The device in the frame that is being drawn.
+    fn look(&mut self) -> Option<ToolState> {
+        self.now = self.now.or_else(|| self.said()).or(self.device().copied());
+        self.now
     }
 
     /// The device so many swaps before the last one.
@@ -144,66 +170,110 @@ impl<'c> Feel<'c> {
     }
 
     /// All that pushes or pulls, or else the nearest bone; none as long as nothing is known.
-    fn model(&self) -> Option<LocalModel> {
-        let (seen, device) = (self.tool?, self.device()?);
-        let position = device.sample.position;
-        let bone = self.bone_model(&seen)?;
-        let parts = [self.held(&seen), self.cut_model(), Some(bone), self.dura(&seen)];
-        let acts = |part: &LocalModel| part.force_at(position) != Vec3::ZERO;
-        let all = parts.into_iter().flatten().filter(acts).reduce(sum);
-        Some(all.unwrap_or(bone))
+    fn model(&mut self) -> Option<LocalModel> {
+        let (seen, device) = (self.tool?, self.look()?);
+        let (bone, normal) = match seen.coupling {
+            Some(coupling) => (self.drilled(seen.tip, coupling, &device), None),
+            None => self.nearest(&seen, &device),
+        };
+        let held = self.held(&seen, &device);
+        let dura = self.dura(&seen);
+        let [blade, tool] = &mut self.drags;
+        let cut = blade.follow(&device, seen.work.cuts.then_some([CUTTING, CUTTING_GIVES]), None);
+        let press = normal.map(|normal| bone.force_at(device.sample.position).dot(normal));
+        let rub = press.map(|press| [FRICTION * press, FRICTION_GIVES]);
+        let rub = tool.follow(&device, rub, normal);
+        let acts = |part: &LocalModel| part.force_at(device.sample.position) != Vec3::ZERO;
+        let parts = [held, cut, Some(bone), rub, dura];
+        Some(parts.into_iter().flatten().filter(acts).reduce(sum).unwrap_or(bone))
     }
 
-    /// Of the bone that is nearest, or that the drill is in.
-    fn bone_model(&self, seen: &Seen) -> Option<LocalModel> {
-        if let Some(Coupling { force, stiffness, normal }) = seen.coupling {
-            return Some(spring(force, stiffness, Some(normal), self.at(MOVED)?));
-        }
-        let device = self.device()?;
+    /// Of bone that a drill is in with its tip.
+    ///
+    /// A wide bit touches bone elsewhere than its tip does, on which the hand may rest already. A step from
+    /// the one to the other would push the hand; so the drill is led by as much beside the device.
+    fn drilled(&mut self, tip: Vec3, coupling: Coupling, device: &ToolState) -> LocalModel {
+        let Coupling { stiffness, normal, .. } = coupling;
+        let place = device.sample.position;
+        let shift = *self.shift.get_or_insert_with(|| {
+            let step = match self.rest {
+                Some(rest) => (tip - rest).dot(normal),
+                None => (tip - place).dot(normal).max(0.0),
+            };
+            normal * step.clamp(-SHIFT, SHIFT)
+        });
+        spring(coupling.force(place + shift - tip), stiffness, Some(normal), device)
+    }
+
+    /// Of the bone that is nearest, or touched deepest, with its normal if it is touched.
+    fn nearest(&mut self, seen: &Seen, device: &ToolState) -> (LocalModel, Option<Vec3>) {
         let stiffness = seen.push.map_or(ContactStiffness::BONE, ContactStiffness::new);
-        let height = |model: &LocalModel| {
-            model.normal.map_or(f32::INFINITY, |normal| -model.force.dot(normal))
-        };
         let models = self.proxies.iter().map(|(_, proxy)| proxy.model(device, stiffness));
-        let nearest = models.min_by(|a, b| height(a).total_cmp(&height(b)));
+        let press = |model: &LocalModel| model.normal.map(|normal| model.force.dot(normal));
         let (position, time) = (device.sample.position, device.time);
-        Some(nearest.unwrap_or(LocalModel { position, time, ..LocalModel::FREE }))
+        let far = LocalModel { position, time, ..LocalModel::FREE };
+        let nearest = models
+            .filter(|model| model.normal.is_some())
+            .max_by(|a, b| press(a).unwrap_or(0.0).total_cmp(&press(b).unwrap_or(0.0)))
+            .unwrap_or(far);
+        let normal = nearest.normal.filter(|_| nearest.force_at(position) != Vec3::ZERO);
+        self.shift = None;
+        self.rest = normal.map(|_| position + nearest.force / stiffness.newtons_per_metre());
+        (nearest, normal)
     }
 
     /// Of what is held: a spring from where it was taken hold of.
-    fn held(&self, seen: &Seen) -> Option<LocalModel> {
+    fn held(&self, seen: &Seen, device: &ToolState) -> Option<LocalModel> {
         let force = seen.work.held;
-        let is_closed = self.device()?.sample.buttons & 1 == 1;
         let then = self.at(HELD)?;
         let drawn = then.sample.position.distance(self.grasp).max(DRAWN);
         let stiffness = (force.length() / drawn).min(HOLD);
-        (is_closed && force != Vec3::ZERO).then(|| spring(force, stiffness, None, then))
+        let holds = device.sample.buttons & 1 == 1 && force != Vec3::ZERO;
+        holds.then(|| spring(force, stiffness, None, then))
     }
 
     /// Of the dura.
     fn dura(&self, seen: &Seen) -> Option<LocalModel> {
         let force = seen.work.tissue;
         let normal = force.try_normalize()?;
-        let along = normal * -DURA;
-        let gradient = Mat3::from_cols(along * normal.x, along * normal.y, along * normal.z);
+        let gradient = along(normal) * -DURA;
         Some(LocalModel { gradient, ..spring(force, 0.0, Some(normal), self.at(TOUCHED)?) })
     }
+}
 
-    /// A blade draws tissue along until that is cut.
-    fn cut(&mut self) {
-        let cuts = self.tool.is_some_and(|tool| tool.work.cuts);
-        self.edge = self.device().filter(|_| cuts).map(|device| {
-            let place = device.sample.position;
-            place + (self.edge.unwrap_or(place) - place).clamp_length_max(GIVES)
-        });
-    }
+/// Dry friction: a spring that gives way up to a distance, and from there on slides along (P. R. Dahl, "A
+/// solid friction model", 1968, in its simplest form).
+#[derive(Clone, Copy, Debug, Default)]
+struct Drag {
+    /// Where the spring's other end is, if there is any friction.
+    anchor: Option<Vec3>,
+}
 
-    /// Of tissue that is cut.
-    fn cut_model(&self) -> Option<LocalModel> {
-        let (edge, device) = (self.edge?, self.device()?);
-        let stiffness = CUTTING / GIVES;
-        Some(spring((edge - device.sample.position) * stiffness, stiffness, None, device))
+impl Drag {
+    /// A device moves on, against at most so many newtons, with so many metres to give way. Friction on a
+    /// surface is along it.
+    fn follow(
+        &mut self,
+        device: &ToolState,
+        friction: Option<[f32; 2]>,
+        normal: Option<Vec3>,
+    ) -> Option<LocalModel> {
+        let place = device.sample.position;
+        let anchor = std::mem::take(&mut self.anchor);
+        let [strength, gives] = friction?;
+        let across = Mat3::IDENTITY - normal.map_or(Mat3::ZERO, along);
+        let way = (across * (anchor.unwrap_or(place) - place)).clamp_length_max(gives);
+        self.anchor = Some(place + way);
+        let stiffness = strength / gives;
+        // Also while it slides: a force that stays the same where a hand turns back would push it.
+        let gradient = across * -stiffness;
+        Some(LocalModel { gradient, ..spring(way * stiffness, 0.0, None, device) })
     }
+}
+
+/// The projection on a direction of unit length.
+fn along(normal: Vec3) -> Mat3 {
+    Mat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z)
 }
 
 /// A spring that exerts `force` on a tool where the device was `then`.
