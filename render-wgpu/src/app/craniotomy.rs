@@ -94,7 +94,7 @@ pub(super) fn run(
     if let Some(path) = &args.save {
         save(patient, &manager, path)?;
     }
-    let score = operation.report().into();
+    let score = operation.report(|see| manager.visit(see)).into();
     let bone_removed_mm3 = removed(&manager) * 1e9;
     let step = args.step.name();
     let operation = Some(OperationReport { step, pieces, bone_removed_mm3, score });

@@ -5,6 +5,7 @@ pub(crate) mod batch;
 mod bone;
 pub mod drill;
 mod fixed;
+mod grasp;
 mod instrument;
 mod mass_spring;
 pub mod piece;
@@ -30,6 +31,7 @@ use crate::simd::Simd;
 
 pub use bone::Bone;
 pub use fixed::Fixed;
+pub use grasp::{Grasp, Hold, LetGo};
 pub use instrument::Instrument;
 pub use mass_spring::{MassSpring, MassSpringError};
 pub use scripted::{Keyframe, ScriptError, Scripted};

@@ -7,9 +7,11 @@
 //! | [`Operation`] | what the host does: it moves the hands, keeps the score and frees bone |
 //! | `freeing` | bone that a closed cut has freed becomes an object of its own |
 //! | [`Score`] | what educators measure |
+//! | `opening` | how the opening in the skull came out, beside the plan |
 
 mod build;
 mod freeing;
+mod opening;
 mod operation;
 mod score;
 mod script;
@@ -18,8 +20,9 @@ mod steps;
 use crate::object::{Group, ObjectId};
 
 pub use build::{BuildError, build};
+pub use opening::Margin;
 pub use operation::{LOOK_FRAMES, Operation};
-pub use score::{Report, Score};
+pub use score::{Placement, Report, Score};
 pub use steps::Step;
 
 use super::head::Head;
