@@ -17,7 +17,9 @@ use dualframe_sim::image;
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::render::{NullRenderer, Renderer};
 use dualframe_sim::scene::Scene;
-use dualframe_sim::scene::craniotomy::{LOOK_FRAMES, Operation, SKULL, Step, TIME_STEP, TOOLS};
+use dualframe_sim::scene::craniotomy::{
+    self, LOOK_FRAMES, Operation, SKULL, Step, TIME_STEP, TOOLS,
+};
 use dualframe_sim::timeline::Timeline;
 use glam::Vec3;
 
@@ -190,8 +192,8 @@ impl<'c> Surgery<'c> {
     }
 
     /// What was measured so far.
-    pub(super) fn score(&self) -> dualframe_sim::scene::craniotomy::Report {
-        self.operation.report()
+    pub(super) fn score(&self, manager: &VeManager) -> craniotomy::Report {
+        self.operation.report(|see| manager.visit(see))
     }
 
     /// Advances by so many frames, or until freed bone is looked for.
@@ -225,7 +227,7 @@ impl<'c> Surgery<'c> {
             step: self.step.map_or("by hand", Step::name),
             pieces: self.pieces,
             bone_removed_mm3: removed(manager) * 1e9,
-            score: self.score().into(),
+            score: self.score(manager).into(),
             haptics: self.devices.iter().flatten().map(Into::into).collect(),
         }
     }

@@ -25,6 +25,9 @@ use crate::app::particles::RunError;
 use crate::app::recording::Recording;
 use crate::app::scenes::Patient;
 
+/// Frames from one score to the next; usually 30: half a second. It takes up to 2 ms.
+const SCORE_FRAMES: u64 = 30;
+
 /// A craniotomy in a window.
 pub(in crate::app) struct CraniotomyAtHand<'a, 'c> {
     args: &'a CraniotomyArgs,
@@ -32,6 +35,8 @@ pub(in crate::app) struct CraniotomyAtHand<'a, 'c> {
     pub(in crate::app) surgery: Surgery<'c>,
     /// As long as a script moves the tools.
     unlinked: Option<Each<SimulationEnd<'c>>>,
+    /// The frame from which on the score is told again.
+    next_score: u64,
     // Loops that are dropped end.
     _threads: Each<HapticThread<'c>>,
 }
@@ -48,7 +53,10 @@ impl<'a, 'c> CraniotomyAtHand<'a, 'c> {
         let [priority, _] = threads.each_ref().map(|thread| thread.priority().to_string());
         let devices = Devices { places, inputs, priority, states: Default::default() };
         let hand = ToolGrip::new(Arc::clone(&patient.head), devices, surgery.frames() == 0);
-        (Self { args, patient, surgery, unlinked: Some(ends), _threads: threads }, hand)
+        (
+            Self { args, patient, surgery, unlinked: Some(ends), next_score: 0, _threads: threads },
+            hand,
+        )
     }
 
     /// Whether no script moves the tools in the frames that come.
@@ -71,6 +79,7 @@ impl<'c> Scenario for CraniotomyAtHand<'_, 'c> {
             self.unlinked = Some([one, other]);
         }
         self.surgery = Surgery::new(self.patient, self.args.step);
+        self.next_score = 0;
         Ok(self.patient.build(self.args.way.simd())?)
     }
 
@@ -99,7 +108,10 @@ impl<'c> Scenario for CraniotomyAtHand<'_, 'c> {
     ) -> Result<VeManager, RunError> {
         let manager = self.surgery.advance(manager, recording, frames, view, host)?;
         view.hand.is_free = self.is_free(&manager);
-        view.hand.score = self.surgery.score();
+        if manager.frame() >= self.next_score {
+            view.hand.score = self.surgery.score(&manager);
+            self.next_score = manager.frame() + SCORE_FRAMES;
+        }
         view.hand.devices.states = self.surgery.devices;
         Ok(manager)
     }

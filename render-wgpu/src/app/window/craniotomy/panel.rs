@@ -2,7 +2,7 @@
 
 use dualframe_sim::behavior::Instrument;
 use dualframe_sim::device::link::ToolState;
-use dualframe_sim::scene::craniotomy::Report;
+use dualframe_sim::scene::craniotomy::{Margin, Placement, Report};
 use egui::{Checkbox, Grid, Ui};
 
 use super::grip::ToolGrip;
@@ -68,6 +68,16 @@ fn score(ui: &mut Ui, score: &Report) {
         line("past the inner table", format!("{:.2} mm", millimetres(score.plunge)));
         let (tears, length) = (score.dural_tears, millimetres(score.dural_tear_length));
         line("dural tears", format!("{tears}, {length:.1} mm"));
+        line("force on dura", format!("{:.2} N at most", score.peak_dural_force));
+        if let Some(Placement { error, angle }) = score.burr_hole {
+            let (error, angle) = (millimetres(error), angle.to_degrees());
+            line("burr hole", format!("{error:.1} mm aside, {angle:.0}° oblique"));
+        }
+        if let Some(Margin { mean, greatest, cut }) = score.margin {
+            let (mean, greatest, cut) = (millimetres(mean), millimetres(greatest), 100.0 * cut);
+            line("margin", format!("off by {mean:.1} mm, at most {greatest:.1}; {cut:.0} % cut"));
+        }
+        line("bone outside the plan", format!("{:.0} mm³", score.bone_outside_plan * 1e9));
     });
 }
 
