@@ -89,8 +89,9 @@ fn push_cut(skull: &Volume, (from, to): (&Entry, &Entry), reach: f32, voxels: &m
         let middle = Vec3::new(x as f32, y as f32, z as f32) + 0.5;
         let way = skull.to_world(middle * skull.spacing()) - from.point;
         let aside = across(way);
-        // Of two equal ends the share is not a number, which gives way to 0.
-        let share = (aside.dot(length) / length.length_squared()).clamp(0.0, 1.0);
+        // Of two equal ends the share is 0.
+        let share =
+            (aside.dot(length) / length.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
         let near = aside.distance_squared(length * share) <= reach * reach;
         if near && depths.contains(&way.dot(inward)) {
             voxels.push([x, y, z].map(|index| index as i32));
