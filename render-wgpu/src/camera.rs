@@ -91,16 +91,26 @@ impl Camera {
         self.distance = (self.distance * factor).clamp(1e-3, 1e4);
     }
 
+    /// The direction in which `point` of a picture so many times as wide as high is seen from the
+    /// [`Camera::eye`], of unit length. Points go from (−1, −1) at the lower left to (1, 1).
+    #[must_use]
+    pub fn direction(&self, point: Vec2, aspect: f32) -> Vec3 {
+        self.ray(point, aspect).normalize()
+    }
+
     /// The place seen at `point` of a picture so many times as wide as high, at the depth of
     /// `anchor`. Points go from (−1, −1) at the lower left to (1, 1).
     #[must_use]
     pub fn unproject(&self, point: Vec2, aspect: f32, anchor: Vec3) -> Vec3 {
-        let forward = -self.outward();
+        let depth = (anchor - self.eye()).dot(-self.outward());
+        self.eye() + self.ray(point, aspect) * depth
+    }
+
+    /// From the eye to what is seen at a point, a metre deep.
+    fn ray(&self, point: Vec2, aspect: f32) -> Vec3 {
         let (right, up) = self.axes();
         let slope = (0.5 * FIELD_OF_VIEW).tan();
-        let ray = forward + right * (point.x * slope * aspect) + up * (point.y * slope);
-        let depth = (anchor - self.eye()).dot(forward);
-        self.eye() + ray * depth
+        right * (point.x * slope * aspect) + up * (point.y * slope) - self.outward()
     }
 }
 
@@ -158,6 +168,9 @@ mod tests {
         let clip = camera.view_projection(1.5).project_point3(place);
         let back = camera.unproject(clip.truncate(), 1.5, place);
         assert!(back.distance(place) < 1e-4, "{back}");
+        let direction = camera.direction(clip.truncate(), 1.5);
+        let there = camera.eye() + direction * camera.eye().distance(place);
+        assert!(there.distance(place) < 1e-4, "{there}");
     }
 
     #[test]

@@ -7,8 +7,8 @@ use std::any::Any;
 
 use common::no_rules;
 use dualframe_sim::behavior::drill::{Bit, Burr, Erode, Feed, Reaction};
-use dualframe_sim::behavior::piece::{Grasp, Hold, Piece};
-use dualframe_sim::behavior::{Behavior, Bone, Input};
+use dualframe_sim::behavior::piece::Piece;
+use dualframe_sim::behavior::{Behavior, Bone, Grasp, Hold, Input};
 use dualframe_sim::executor::ExecutorKind;
 use dualframe_sim::geometry::{Geometry, Rigid, Volume};
 use dualframe_sim::interaction::{
@@ -165,7 +165,7 @@ fn session(settings: Settings) -> ([u64; 3], Vec3) {
     let by = ObjectId(0);
     post(Message::Custom(Box::new(Grasp {
         by,
-        point: point.to_array(),
+        point,
         radius: 2e-3,
         stiffness: 1e3,
         strength: 20.0,
@@ -176,7 +176,7 @@ fn session(settings: Settings) -> ([u64; 3], Vec3) {
     let mut manager = VeManager::new(scene, settings).expect("the settings are allowed");
     let freed = manager.state_hash();
     for step in 1..=60_u32 {
-        let position = (point + Vec3::Z * 5e-4 * step as f32).to_array();
+        let position = point + Vec3::Z * 5e-4 * step as f32;
         mailbox.post(PIECE, Message::Custom(Box::new(Hold { by, position })));
         advance(&mut manager, 1);
     }

@@ -6,8 +6,8 @@ use std::any::Any;
 
 use common::{no_rules, run, serial};
 use dualframe_sim::behavior::drill::{Bit, Burr, Erode};
-use dualframe_sim::behavior::piece::{BONE_DENSITY, Grasp, Hold, LetGo, Piece};
-use dualframe_sim::behavior::{Bone, Fixed};
+use dualframe_sim::behavior::piece::{BONE_DENSITY, Piece};
+use dualframe_sim::behavior::{Bone, Fixed, Grasp, Hold, LetGo};
 use dualframe_sim::executor::{Executor, SerialExecutor};
 use dualframe_sim::geometry::{Geometry, Volume};
 use dualframe_sim::interaction::{InteractionPair, PieceInBone, PieceOnBone};
@@ -185,13 +185,12 @@ fn lies_in_its_place_until_it_is_pulled() {
     let start = center(&executor);
     run(&mut executor, 60);
     assert_eq!(center(&executor), start, "nothing moves it");
-    let grasp =
-        Grasp { by: TOOL, point: start.to_array(), radius: 3e-3, stiffness: 1e3, strength: 20.0 };
-    let miss = Grasp { point: (start + Vec3::Z * 0.05).to_array(), by: ObjectId(8), ..grasp };
+    let grasp = Grasp { by: TOOL, point: start, radius: 3e-3, stiffness: 1e3, strength: 20.0 };
+    let miss = Grasp { point: start + Vec3::Z * 0.05, by: ObjectId(8), ..grasp };
     let invalid = Grasp { stiffness: f32::NAN, by: ObjectId(7), ..grasp };
     [grasp, miss, invalid].into_iter().for_each(|grasp| post(&executor, grasp));
     let hold = |executor: &SerialExecutor, up: f32| {
-        post(executor, Hold { by: TOOL, position: (start + Vec3::Z * up).to_array() });
+        post(executor, Hold { by: TOOL, position: start + Vec3::Z * up });
     };
     hold(&executor, 2e-3);
     run(&mut executor, 30);
@@ -219,9 +218,8 @@ fn a_piece_let_go_elsewhere_falls() {
     let pose = Pose::from_translation(Vec3::new(0.0, 0.0, 0.1));
     let mut executor = scene(flap(pose), false, vec![], 9.81);
     let start = center(&executor);
-    let point = start.to_array();
-    post(&executor, Grasp { by: TOOL, point, radius: 3e-3, stiffness: 1e3, strength: 20.0 });
-    post(&executor, Hold { by: TOOL, position: (start + Vec3::X * 0.02).to_array() });
+    post(&executor, Grasp { by: TOOL, point: start, radius: 3e-3, stiffness: 1e3, strength: 20.0 });
+    post(&executor, Hold { by: TOOL, position: start + Vec3::X * 0.02 });
     run(&mut executor, 60);
     post(&executor, LetGo { by: TOOL });
     run(&mut executor, 60);
@@ -234,17 +232,14 @@ fn is_not_pressed_into_bone() {
     let pose = Pose::from_translation(Vec3::new(0.0, 0.0, 0.003));
     let mut executor = scene(flap(pose), true, vec![floor()], 9.81);
     let grip = center(&executor) + Vec3::new(7e-3, 4e-3, 0.0);
-    post(
-        &executor,
-        Grasp { by: TOOL, point: grip.to_array(), radius: 3e-3, stiffness: 2e3, strength: 20.0 },
-    );
-    post(&executor, Hold { by: TOOL, position: (grip - Vec3::Z * 0.02).to_array() });
+    post(&executor, Grasp { by: TOOL, point: grip, radius: 3e-3, stiffness: 2e3, strength: 20.0 });
+    post(&executor, Hold { by: TOOL, position: grip - Vec3::Z * 0.02 });
     for _ in 0..200 {
         run(&mut executor, 1);
         assert!(lowest(&executor) > -5e-4, "{} m", lowest(&executor));
     }
     let lifted = grip + Vec3::Z * 0.03;
-    post(&executor, Hold { by: TOOL, position: lifted.to_array() });
+    post(&executor, Hold { by: TOOL, position: lifted });
     run(&mut executor, 120);
     assert!(lowest(&executor) > 5e-3, "{}", lowest(&executor));
 }
@@ -257,7 +252,8 @@ fn scenery_and_bone_ignore_hands() {
     for id in [1, 5] {
         let message = LetGo { by: TOOL };
         executor.mailbox().post(ObjectId(id), Message::Custom(Box::new(message)));
-        let grasp = Grasp { by: TOOL, point: [0.0; 3], radius: 1.0, stiffness: 1.0, strength: 1.0 };
+        let grasp =
+            Grasp { by: TOOL, point: Vec3::ZERO, radius: 1.0, stiffness: 1.0, strength: 1.0 };
         executor.mailbox().post(ObjectId(id), Message::Custom(Box::new(grasp)));
     }
     run(&mut executor, 3);

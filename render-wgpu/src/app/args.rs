@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dualframe_sim::blocking::{Blocking, Grain};
+use dualframe_sim::device::thread::{MAX_RATE, RATE};
 use dualframe_sim::executor::{Entry, ExecutorKind, MAX_THREADS};
 use dualframe_sim::experiment::Experiment;
 use dualframe_sim::experiment::plan::Plan;
@@ -197,12 +198,6 @@ pub(super) struct Particles {
     pub(super) gravity: bool,
     #[command(flatten)]
     pub(super) way: Way,
-    /// Show a window, which is what happens where there is a display
-    #[arg(long, conflicts_with_all = ["headless", "offscreen", "frames_out"])]
-    pub(super) window: bool,
-    /// Run without a window
-    #[arg(long, conflicts_with = "offscreen")]
-    headless: bool,
     #[command(flatten)]
     pub(super) products: Products,
 }
@@ -210,6 +205,12 @@ pub(super) struct Particles {
 /// What a run draws and writes.
 #[derive(Args)]
 pub(super) struct Products {
+    /// Show a window, which is what happens where there is a display
+    #[arg(long, conflicts_with_all = ["headless", "offscreen", "frames_out"])]
+    pub(super) window: bool,
+    /// Run without a window
+    #[arg(long, conflicts_with = "offscreen")]
+    headless: bool,
     /// Draw every frame without a window
     #[arg(long)]
     pub(super) offscreen: bool,
@@ -236,29 +237,43 @@ pub(super) struct Products {
     pub(super) json: Option<PathBuf>,
 }
 
+impl Products {
+    /// Whether a window is to be shown if there can be one: nothing else was asked for.
+    pub(super) fn prefers_window(&self) -> bool {
+        let pictures = self.picture.is_some() || self.frames_out.is_some();
+        self.window || !(self.headless || self.offscreen || pictures)
+    }
+}
+
 /// Arguments of the craniotomy.
 #[derive(Args)]
 pub(super) struct CraniotomyArgs {
-    /// How far the operation goes
-    #[arg(long, value_name = "STEP", default_value = Step::All.name(), value_parser = parse_step,
-          help = format!("How far the operation goes: {}", Step::ALL.map(Step::name).join(", ")))]
-    pub(super) step: Step,
+    #[arg(long, value_name = "STEP", value_parser = parse_step,
+          help = format!("How far a script operates: {}; in a window not at all if not given, else {}",
+                         Step::ALL.map(Step::name).join(", "), Step::All.name()))]
+    pub(super) step: Option<Step>,
     /// The patient's computed tomography, NIfTI or NRRD; a synthetic head if not given
     #[arg(long, value_name = "FILE")]
     pub(super) ct: Option<PathBuf>,
     /// Write the computed tomography as it is after the operation, as NIfTI
     #[arg(long, value_name = "FILE.nii.gz")]
     pub(super) save: Option<PathBuf>,
+    #[arg(long, value_name = "HZ", default_value_t = RATE, value_parser = parse_rate,
+          help = format!("How often a second the haptic loops of a window's hands tick, 1 to {MAX_RATE}"))]
+    pub(super) haptic_rate: f64,
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_FRAMES),
-          help = format!("Number of frames, 1 to {MAX_FRAMES}; the operation's own if not given"))]
+          help = format!("Number of frames, 1 to {MAX_FRAMES}; if not given, the operation's own, or in a \
+                          window until it is closed"))]
     pub(super) frames: Option<u64>,
     #[command(flatten)]
     pub(super) way: Way,
-    /// Run without a window, which is what happens in any case
-    #[arg(long, conflicts_with = "offscreen")]
-    headless: bool,
     #[command(flatten)]
     pub(super) products: Products,
+}
+
+fn parse_rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate| (1.0..=MAX_RATE).contains(rate));
+    rate.ok_or_else(|| format!("not a number from 1 to {MAX_RATE}"))
 }
 
 fn parse_step(text: &str) -> Result<Step, String> {
@@ -276,13 +291,6 @@ impl Particles {
     /// The number of frames of a run without a window.
     pub(super) fn frames(&self) -> u64 {
         self.frames.unwrap_or(USUAL_FRAMES)
-    }
-
-    /// Whether a window is to be shown if there can be one: nothing else was asked for.
-    pub(super) fn prefers_window(&self) -> bool {
-        let Products { offscreen, picture, frames_out, .. } = &self.products;
-        let pictures = picture.is_some() || frames_out.is_some();
-        self.window || !(self.headless || *offscreen || pictures)
     }
 
     /// What fits no single argument.

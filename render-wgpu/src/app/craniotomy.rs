@@ -4,89 +4,94 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 use std::sync::Arc;
+use std::thread;
 
 use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_sim::behavior::Bone;
 use dualframe_sim::blocking::Grain;
-use dualframe_sim::executor::{ExecutorError, FrameRecord};
+use dualframe_sim::device::link::{SimulationEnd, ToolState};
+use dualframe_sim::executor::FrameRecord;
 use dualframe_sim::geometry::{Bounds, Volume};
 use dualframe_sim::image;
-use dualframe_sim::manager::VeManager;
+use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::render::{NullRenderer, Renderer};
-use dualframe_sim::scene::craniotomy::{LOOK_FRAMES, Operation, SKULL};
+use dualframe_sim::scene::Scene;
+use dualframe_sim::scene::craniotomy::{
+    self, LOOK_FRAMES, Operation, SKULL, Step, TIME_STEP, TOOLS,
+};
 use dualframe_sim::timeline::Timeline;
 use glam::Vec3;
 
 use super::AllocationCounter;
 use super::args::CraniotomyArgs;
+use super::haptics::{Cells, Each, Loops};
 use super::measure::Measure;
 use super::outputs::{self, Outputs};
-use super::particles::{RunError, TRACED_SPANS, progress_bar};
+use super::particles::{RunError, SHOWN_SPANS, TRACED_SPANS, progress_bar};
 use super::pictures::Pictures;
 use super::recording::Recording;
 use super::report::{OperationReport, Report};
 use super::scenes::Patient;
+use super::window::{CraniotomyAtHand, Session, most_threads};
 
 /// From how far the place of the operation is seen, over the size of its box.
 const DISTANCE: f32 = 1.4;
 
-/// Operates as `args` say.
+/// What makes a manager of a scene.
+type Manage<'a> = &'a dyn Fn(Scene) -> Result<VeManager, RunError>;
+
+/// Operates as `args` say. `note` is told what the person at the terminal should know.
 pub(super) fn run(
     args: &CraniotomyArgs,
     patient: &Patient,
     outputs: &Outputs,
     count: AllocationCounter<'_>,
+    note: &dyn Fn(&str),
+) -> Result<Report, RunError> {
+    let scene = patient.build(args.way.simd())?;
+    let places = TOOLS.map(|tool| scene.objects[tool.0 as usize].center());
+    let cells = &mut Cells::new(places);
+    // Haptic loops end with it.
+    thread::scope(|scope| {
+        let what = (args, patient, outputs);
+        run_beside(|| Ok(cells.start(scope, args.haptic_rate)?), scene, what, count, note)
+    })
+}
+
+/// Operates on a scene beside haptic loops, which `start` starts where a person operates.
+fn run_beside<'c>(
+    start: impl FnOnce() -> Result<Loops<'c, 'c>, RunError>,
+    scene: Scene,
+    (args, patient, outputs): (&CraniotomyArgs, &Patient, &Outputs),
+    count: AllocationCounter<'_>,
+    note: &dyn Fn(&str),
 ) -> Result<Report, RunError> {
     let settings = args.way.settings(Grain::Pairwise);
-    let mut operation = Operation::new(Arc::clone(&patient.head), Some(args.step));
-    let frames = args.frames.unwrap_or_else(|| operation.frames());
+    let is_traced = outputs.trace.is_some();
+    let spans = if is_traced { TRACED_SPANS } else { SHOWN_SPANS };
     // One more for whoever renders beside rayon's workers.
-    let timeline = Arc::new(Timeline::new(settings.threads + 1, TRACED_SPANS));
-    let manage = |scene| {
-        let mut manager = VeManager::new(scene, settings)?;
-        if outputs.trace.is_some() {
-            manager.watch(Arc::clone(&timeline));
+    let workers = settings.threads.max(most_threads()) + 1;
+    let timeline = Arc::new(Timeline::new(workers, spans));
+    let at_hand = || Ok(CraniotomyAtHand::begin(args, patient, start()?));
+    let how = (&args.way, &args.products);
+    let window = Session::open(at_hand, how, TIME_STEP, &timeline, note)?;
+    let is_watched = window.is_some() || is_traced;
+    let manage = |scene| manage(scene, settings, is_watched.then_some(&timeline));
+    let manager = manage(scene)?;
+    let recording = Recording::begin(outputs.record.as_ref(), patient.spec(), &manager)?;
+    let (manager, surgery, measure) = match window {
+        Some(window) => {
+            let mut measure = Measure::new(args.frames, count);
+            measure.start();
+            let picture = outputs.picture.as_ref();
+            let on_frame = &mut |record: &FrameRecord| measure.frame(record);
+            let (manager, at_hand) =
+                window.run(manager, recording, args.frames, picture, on_frame)?;
+            (manager, at_hand.surgery, measure)
         }
-        Ok::<_, ExecutorError>(manager)
+        None => run_unwatched(args, patient, outputs, (manager, recording, &manage), count)?,
     };
-    let mut manager = manage(patient.build(args.way.simd())?)?;
-    let mut recording = Recording::begin(outputs.record.as_ref(), patient.spec(), &manager)?;
-    let mut pictures = Pictures::new(&args.products, frames, look(operation.region()))?;
-    let mut measure = Measure::new(Some(frames), count);
-    let bar = progress_bar(frames);
-    let mut unwatched = NullRenderer::new();
-    let mut pieces = 0;
-    measure.start();
-    while manager.frame() < frames {
-        let until_look = LOOK_FRAMES - manager.frame() % LOOK_FRAMES;
-        let batch = until_look.min(frames - manager.frame());
-        let renderer: &mut dyn Renderer = match &mut pictures {
-            Some(pictures) => pictures,
-            None => &mut unwatched,
-        };
-        let (hands, mut watch) = operation.parts(renderer);
-        let mailbox = manager.mailbox();
-        let mut on_frame = |record: &FrameRecord| {
-            hands.swapped(record.frame, &mailbox);
-            measure.frame(record);
-            if !bar.is_hidden() {
-                measure.beside(|| bar.inc(1));
-            }
-        };
-        recording.run(&mut manager, batch, &mut watch, &mut on_frame)?;
-        let freed;
-        (manager, freed) = operation.look(manager, manage)?;
-        if freed > 0 {
-            recording.objects(&manager)?;
-            pieces += freed;
-        }
-    }
-    recording.end(&manager)?;
-    bar.finish_and_clear();
-    if let Some(pictures) = pictures {
-        pictures.finish(outputs.picture.as_ref())?;
-    }
     if let Some(file) = &outputs.trace {
         let write = |writer: &mut BufWriter<&File>| timeline.write_chrome_trace(writer);
         outputs::replace(file, write).map_err(RunError::Trace)?;
@@ -94,26 +99,149 @@ pub(super) fn run(
     if let Some(path) = &args.save {
         save(patient, &manager, path)?;
     }
-    let score = operation.report().into();
-    let bone_removed_mm3 = removed(&manager) * 1e9;
-    let step = args.step.name();
-    let operation = Some(OperationReport { step, pieces, bone_removed_mm3, score });
     let report = Report::of("craniotomy", args.way.simd(), &manager, &measure);
-    Ok(Report { operation, ..report })
+    Ok(Report { operation: Some(surgery.report(&manager)), ..report })
+}
+
+fn manage(
+    scene: Scene,
+    settings: Settings,
+    timeline: Option<&Arc<Timeline>>,
+) -> Result<VeManager, RunError> {
+    let mut manager = VeManager::new(scene, settings)?;
+    if let Some(timeline) = timeline {
+        manager.watch(Arc::clone(timeline));
+    }
+    Ok(manager)
+}
+
+/// Runs without a window: a script operates.
+fn run_unwatched<'c, 'h>(
+    args: &CraniotomyArgs,
+    patient: &Patient,
+    outputs: &Outputs,
+    (mut manager, mut recording, manage): (VeManager, Recording<'_>, Manage<'_>),
+    count: AllocationCounter<'c>,
+) -> Result<(VeManager, Surgery<'h>, Measure<'c>), RunError> {
+    let mut surgery = Surgery::new(patient, Some(args.step.unwrap_or(Step::All)));
+    let frames = args.frames.unwrap_or_else(|| surgery.frames());
+    let look = |quality| look(surgery.region(), quality);
+    let mut pictures = Pictures::new(&args.products, frames, look)?;
+    let mut measure = Measure::new(Some(frames), count);
+    let bar = progress_bar(frames);
+    let mut unwatched = NullRenderer::new();
+    measure.start();
+    while manager.frame() < frames {
+        let renderer: &mut dyn Renderer = match &mut pictures {
+            Some(pictures) => pictures,
+            None => &mut unwatched,
+        };
+        let mut on_frame = |record: &FrameRecord| {
+            measure.frame(record);
+            if !bar.is_hidden() {
+                measure.beside(|| bar.inc(1));
+            }
+        };
+        let left = frames - manager.frame();
+        let how = (&mut on_frame as &mut dyn FnMut(&FrameRecord), manage);
+        manager = surgery.advance(manager, &mut recording, left, renderer, how)?;
+    }
+    recording.end(&manager)?;
+    bar.finish_and_clear();
+    if let Some(pictures) = pictures {
+        pictures.finish(outputs.picture.as_ref())?;
+    }
+    Ok((manager, surgery, measure))
+}
+
+/// An operation under way.
+pub(super) struct Surgery<'c> {
+    operation: Operation<'c>,
+    /// How far a script operates.
+    step: Option<Step>,
+    /// Pieces of bone that came free.
+    pieces: usize,
+    /// What the hands' haptic loops last said, where some are linked.
+    pub(super) devices: Each<Option<ToolState>>,
+}
+
+impl<'c> Surgery<'c> {
+    pub(super) fn new(patient: &Patient, step: Option<Step>) -> Self {
+        let operation = Operation::new(Arc::clone(&patient.head), step);
+        Self { operation, step, pieces: 0, devices: Default::default() }
+    }
+
+    /// From now on the hands are where their devices are.
+    pub(super) fn link(&mut self, ends: Each<SimulationEnd<'c>>) {
+        (0..).zip(ends).for_each(|(hand, end)| self.operation.link(hand, end));
+    }
+
+    /// The ends of the loops that the hands were linked with.
+    pub(super) fn unlink(&mut self) -> Each<Option<SimulationEnd<'c>>> {
+        self.operation.unlink()
+    }
+
+    /// The frames that the script takes; none without a script.
+    pub(super) fn frames(&self) -> u64 {
+        self.operation.frames()
+    }
+
+    /// The place of the operation.
+    pub(super) fn region(&self) -> Bounds {
+        self.operation.region()
+    }
+
+    /// What was measured so far.
+    pub(super) fn score(&self, manager: &VeManager) -> craniotomy::Report {
+        self.operation.report(|see| manager.visit(see))
+    }
+
+    /// Advances by so many frames, or until freed bone is looked for.
+    pub(super) fn advance(
+        &mut self,
+        mut manager: VeManager,
+        recording: &mut Recording<'_>,
+        frames: u64,
+        renderer: &mut dyn Renderer,
+        (on_frame, manage): (&mut dyn FnMut(&FrameRecord), Manage<'_>),
+    ) -> Result<VeManager, RunError> {
+        let until_look = LOOK_FRAMES - manager.frame() % LOOK_FRAMES;
+        let (hands, mut watch) = self.operation.parts(renderer);
+        let mailbox = manager.mailbox();
+        let mut on_frame = |record: &FrameRecord| {
+            hands.swapped(record.frame, &mailbox);
+            on_frame(record);
+        };
+        recording.run(&mut manager, frames.min(until_look), &mut watch, &mut on_frame)?;
+        self.devices = [0, 1].map(|hand| hands.device(hand));
+        let (manager, freed) = self.operation.look(manager, manage)?;
+        if freed > 0 {
+            recording.objects(&manager)?;
+            self.pieces += freed;
+        }
+        Ok(manager)
+    }
+
+    fn report(&self, manager: &VeManager) -> OperationReport {
+        OperationReport {
+            step: self.step.map_or("by hand", Step::name),
+            pieces: self.pieces,
+            bone_removed_mm3: removed(manager) * 1e9,
+            score: self.score(manager).into(),
+            haptics: self.devices.iter().flatten().map(Into::into).collect(),
+        }
+    }
 }
 
 /// What the place of the operation looks like: from above and from the side of the surgeon, who stands at
 /// the patient's head.
-fn look(region: Bounds) -> impl FnOnce(Quality) -> (Look, Camera) {
-    move |quality| {
-        let around = Camera::around(&region);
-        let camera =
-            Camera { pitch: 0.75, yaw: 0.15, distance: DISTANCE * around.distance, ..around };
-        let light = Vec3::new(-0.35, 1.0, 0.6);
-        // The whole head, for its shadows.
-        let focus = Bounds { min: Vec3::splat(-0.11), max: Vec3::splat(0.11) };
-        (Look { light, room: false, ..Look::room(focus, quality) }, camera)
-    }
+pub(super) fn look(region: Bounds, quality: Quality) -> (Look, Camera) {
+    let around = Camera::around(&region);
+    let camera = Camera { pitch: 0.75, yaw: 0.15, distance: DISTANCE * around.distance, ..around };
+    let light = Vec3::new(-0.35, 1.0, 0.6);
+    // The whole head, for its shadows.
+    let focus = Bounds { min: Vec3::splat(-0.11), max: Vec3::splat(0.11) };
+    (Look { light, room: false, ..Look::room(focus, quality) }, camera)
 }
 
 /// The bone that was drilled away, in cubic metres of full bone.

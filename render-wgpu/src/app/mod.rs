@@ -3,6 +3,7 @@
 mod args;
 mod craniotomy;
 mod experiment;
+mod haptics;
 mod measure;
 mod outputs;
 mod particles;
@@ -103,7 +104,8 @@ fn operate(args: &CraniotomyArgs, allocations: AllocationCounter<'_>) -> ExitCod
         Ok(patient) => patient,
         Err(error) => return fail(&with_causes(&error), BAD_ARGUMENT),
     };
-    match craniotomy::run(args, &patient, &outputs, allocations) {
+    let note = |line: &str| eprintln!("dualframe: {line}");
+    match craniotomy::run(args, &patient, &outputs, allocations, &note) {
         Ok(report) => tell(&report, &outputs),
         Err(RunError::Graphics(error)) => fail(&with_causes(&error), NO_PICTURE),
         Err(error) => fail(&with_causes(&error), UNSOUND),

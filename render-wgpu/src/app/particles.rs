@@ -8,6 +8,7 @@ use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::error::GraphicsError;
 use dualframe_render_wgpu::look::Look;
 use dualframe_sim::blocking::Grain;
+use dualframe_sim::device::thread::LoopError;
 use dualframe_sim::executor::{ExecutorError, ExecutorKind, FrameRecord};
 use dualframe_sim::image::FileError;
 use dualframe_sim::manager::{Settings, VeManager};
@@ -27,14 +28,14 @@ use super::outputs::{self, Outputs};
 use super::pictures::Pictures;
 use super::recording::Recording;
 use super::report::Report;
-use super::window::{Session, most_threads};
+use super::window::{ParticlesAtHand, Session, most_threads};
 
 /// Frames that are run serially too, to say what the speed-up is.
 const REFERENCE_FRAMES: u64 = 48;
 /// Spans of a worker that its timeline keeps for a trace; usually 65,536, some seconds of work.
 pub(super) const TRACED_SPANS: usize = 1 << 16;
 /// Spans of a worker that its timeline keeps for a window; usually 4,096, more than is shown.
-const SHOWN_SPANS: usize = 1 << 12;
+pub(super) const SHOWN_SPANS: usize = 1 << 12;
 
 /// Why a run failed.
 #[derive(Debug, Error)]
@@ -51,6 +52,8 @@ pub(super) enum RunError {
     Trace(#[source] io::Error),
     #[error(transparent)]
     Record(#[from] RecordError),
+    #[error(transparent)]
+    Haptics(#[from] LoopError),
     #[error(transparent)]
     Operation(#[from] BuildError),
     #[error("the image cannot be brought up to date")]
@@ -83,7 +86,10 @@ pub(super) fn run(
     // One more for whoever renders beside rayon's workers.
     let workers = args.way.threads.max(most_threads()) + 1;
     let timeline = Arc::new(Timeline::new(workers, spans));
-    let window = open_window(args, &timeline, note)?;
+    let how = (&args.way, &args.products);
+    let time_step = ParticleScene::TIME_STEP;
+    let at_hand = || Ok(ParticlesAtHand::begin(args));
+    let window = Session::open(at_hand, how, time_step, &timeline, note)?;
     let mut manager = VeManager::new(build(args)?, settings)?;
     let spec = scene_of(args, args.objects);
     let recording = Recording::begin(outputs.record.as_ref(), &spec, &manager)?;
@@ -96,7 +102,7 @@ pub(super) fn run(
             measure.start();
             let picture = outputs.picture.as_ref();
             let on_frame = &mut |record: &FrameRecord| measure.frame(record);
-            let manager = window.run(manager, recording, args.frames, picture, on_frame)?;
+            let (manager, _) = window.run(manager, recording, args.frames, picture, on_frame)?;
             report(args, &manager, &measure, None)
         }
         None => run_unwatched(args, outputs, (manager, recording), settings, count)?,
@@ -106,27 +112,6 @@ pub(super) fn run(
         outputs::replace(file, write).map_err(RunError::Trace)?;
     }
     Ok(report)
-}
-
-/// A window, where one is wanted and possible.
-fn open_window<'a>(
-    args: &'a Particles,
-    timeline: &Arc<Timeline>,
-    note: &'a dyn Fn(&str),
-) -> Result<Option<Session<'a>>, RunError> {
-    if !args.prefers_window() {
-        return Ok(None);
-    }
-    match Session::open(args, Arc::clone(timeline), note) {
-        Ok(window) => Ok(Some(window)),
-        Err(error) if args.window => Err(error.into()),
-        Err(error) => {
-            note(&format!(
-                "running without a window, since {error}; --picture FILE.png draws without one"
-            ));
-            Ok(None)
-        }
-    }
 }
 
 /// Runs without a window.

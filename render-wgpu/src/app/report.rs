@@ -10,6 +10,7 @@ use dualframe_sim::scene::craniotomy;
 use dualframe_sim::simd::Simd;
 use serde::{Serialize, Serializer};
 
+use super::haptics::HapticsReport;
 use super::measure::Measure;
 use super::outputs;
 
@@ -53,6 +54,8 @@ pub(super) struct OperationReport {
     /// Bone that was drilled away, in cubic millimetres of full bone.
     pub(super) bone_removed_mm3: f64,
     pub(super) score: ScoreReport,
+    /// Of the hands' haptic loops, where a person operated.
+    pub(super) haptics: Vec<HapticsReport>,
 }
 
 /// What educators measure.
@@ -64,13 +67,24 @@ pub(super) struct ScoreReport {
     peak_force_n: f32,
     force_p95_n: f32,
     peak_tissue_force_n: f32,
+    peak_dural_force_n: f32,
     plunge_mm: f32,
     dural_tears: u32,
     dural_tear_mm: f32,
+    /// Null without a burr hole.
+    burr_hole_error_mm: Option<f32>,
+    burr_hole_angle_deg: Option<f32>,
+    /// Null without a cut.
+    margin_error_mean_mm: Option<f32>,
+    margin_error_max_mm: Option<f32>,
+    /// The share of the outline that is cut.
+    outline_cut: f32,
+    bone_outside_plan_mm3: f64,
 }
 
 impl From<craniotomy::Report> for ScoreReport {
     fn from(report: craniotomy::Report) -> Self {
+        let craniotomy::Report { burr_hole, margin, .. } = report;
         Self {
             seconds: report.seconds,
             drilling_seconds: report.drilling_seconds,
@@ -78,9 +92,16 @@ impl From<craniotomy::Report> for ScoreReport {
             peak_force_n: report.peak_force,
             force_p95_n: report.force_p95,
             peak_tissue_force_n: report.peak_tissue_force,
+            peak_dural_force_n: report.peak_dural_force,
             plunge_mm: report.plunge * 1e3,
             dural_tears: report.dural_tears,
             dural_tear_mm: report.dural_tear_length * 1e3,
+            burr_hole_error_mm: burr_hole.map(|hole| hole.error * 1e3),
+            burr_hole_angle_deg: burr_hole.map(|hole| hole.angle.to_degrees()),
+            margin_error_mean_mm: margin.map(|margin| margin.mean * 1e3),
+            margin_error_max_mm: margin.map(|margin| margin.greatest * 1e3),
+            outline_cut: margin.map_or(0.0, |margin| margin.cut),
+            bone_outside_plan_mm3: report.bone_outside_plan * 1e9,
         }
     }
 }
@@ -251,7 +272,7 @@ impl Report {
 
 impl OperationReport {
     fn lines(&self, out: &mut impl Write) -> std::io::Result<()> {
-        let Self { step, pieces, bone_removed_mm3, score } = self;
+        let Self { step, pieces, bone_removed_mm3, score, .. } = self;
         writeln!(out, "{step}: {bone_removed_mm3:.1} mm³ of bone removed, {pieces} pieces free")?;
         writeln!(
             out,
@@ -264,8 +285,25 @@ impl OperationReport {
         )?;
         writeln!(
             out,
-            "past the inner table by {:.2} mm; {} dural tears, {:.1} mm; soft tissue {:.2} N",
-            score.plunge_mm, score.dural_tears, score.dural_tear_mm, score.peak_tissue_force_n
-        )
+            "past the inner table by {:.2} mm; {} dural tears, {:.1} mm; soft tissue {:.2} N, dura {:.2} N",
+            score.plunge_mm,
+            score.dural_tears,
+            score.dural_tear_mm,
+            score.peak_tissue_force_n,
+            score.peak_dural_force_n
+        )?;
+        let outside = score.bone_outside_plan_mm3;
+        writeln!(out, "{outside:.1} mm³ of bone removed outside the plan")?;
+        if let (Some(error), Some(angle)) = (score.burr_hole_error_mm, score.burr_hole_angle_deg) {
+            writeln!(out, "burr hole {error:.2} mm and {angle:.1}° from the plan")?;
+        }
+        if let (Some(mean), Some(max)) = (score.margin_error_mean_mm, score.margin_error_max_mm) {
+            let cut = 100.0 * score.outline_cut;
+            writeln!(
+                out,
+                "{cut:.0} % of the outline cut, {mean:.2} mm from the plan, {max:.2} mm at most"
+            )?;
+        }
+        Ok(())
     }
 }

@@ -8,7 +8,7 @@ use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
 use super::drill::{Bit, Burr, Coupling, Erode, Feed, Perforator, Reaction};
-use super::{Behavior, Felt, Input, Instrument, piece, tissue};
+use super::{Behavior, Felt, Grasp, Hold, Input, Instrument, LetGo, tissue};
 use crate::device::DeviceSample;
 use crate::geometry::{Blade, Geometry, Rigid};
 use crate::message::{Custom, Message};
@@ -52,6 +52,8 @@ const HANDLE: f32 = 0.12;
 pub struct Workpieces {
     /// Soft tissue: cut, scraped off, held.
     pub tissue: Vec<ObjectId>,
+    /// Dura, whose force is told by itself.
+    pub dura: Vec<ObjectId>,
     /// Bone that is drilled.
     pub bone: Vec<ObjectId>,
     /// Free pieces of bone: held, and drilled too.
@@ -65,12 +67,22 @@ pub struct Work {
     pub bone: Vec3,
     /// The force of soft tissue on it, in newtons.
     pub tissue: Vec3,
+    /// What of it is the dura's.
+    pub dura: Vec3,
     /// The force of what it holds on it, in newtons.
     pub held: Vec3,
     /// Whether its edge was in tissue.
     pub cuts: bool,
     /// Whether its bit turned.
     pub turns: bool,
+}
+
+impl Work {
+    /// All that pushes and pulls it, in newtons.
+    #[must_use]
+    pub fn force(&self) -> Vec3 {
+        self.bone + self.tissue + self.held
+    }
 }
 
 /// A tool that follows a device: a rigid shape whose origin is its tip, its handle along +z.
@@ -247,16 +259,13 @@ impl Tool {
             (false, true) => {
                 let hook = self.instrument == Instrument::Hook;
                 let strength = if hook { HOOK_STRENGTH } else { FORCEPS_STRENGTH };
-                let grasp =
-                    || tissue::Grasp { by, point: at, radius: REACH, stiffness: HOLD, strength };
-                tell(input, tissue, grasp);
+                let grasp = Grasp { by, point: at, radius: REACH, stiffness: HOLD, strength };
+                tell(input, tissue, || grasp);
                 let [stiffness, strength] = BONE_HOLD;
-                let (point, radius) = (at.to_array(), REACH);
-                tell(input, pieces, || piece::Grasp { by, point, radius, stiffness, strength });
+                tell(input, pieces, || Grasp { stiffness, strength, ..grasp });
             }
             (true, true) => {
-                tell(input, tissue, || tissue::Hold { by, position: at });
-                tell(input, pieces, || piece::Hold { by, position: at.to_array() });
+                tell(input, tissue.iter().chain(pieces), || Hold { by, position: at });
             }
             (true, false) => self.let_go(input),
             (false, false) => {}
@@ -266,8 +275,8 @@ impl Tool {
 
     fn let_go(&self, input: &mut Input<'_>) {
         let by = input.object;
-        tell(input, &self.workpieces.tissue, || tissue::LetGo { by });
-        tell(input, &self.workpieces.pieces, || piece::LetGo { by });
+        let Workpieces { tissue, pieces, .. } = &self.workpieces;
+        tell(input, tissue.iter().chain(pieces), || LetGo { by });
     }
 
     /// Notes what this frame's contacts did, and lets a turning bit take bone away.
@@ -276,8 +285,11 @@ impl Tool {
         let is_bone = |other: ObjectId| bone.contains(&other) || pieces.contains(&other);
         let on_bone = input.contacts().filter(|contact| is_bone(contact.other));
         let reaction = Reaction::new(on_bone, input.time_step);
-        let on_tissue = input.contacts().filter(|contact| !is_bone(contact.other));
-        let tissue = Reaction::new(on_tissue, input.time_step).force;
+        let [tissue, dura] = [None, Some(&self.workpieces.dura)].map(|only| {
+            let counts = |other| !is_bone(other) && only.is_none_or(|only| only.contains(&other));
+            let contacts = input.contacts().filter(|contact| counts(contact.other));
+            Reaction::new(contacts, input.time_step).force
+        });
         if let Some(burr) = self.burr(geometry).filter(|burr| burr.spin != 0.0) {
             let load = self.feed().map_or(0.0, |feed| feed.load(&reaction));
             for &bone in bone.iter().chain(pieces) {
@@ -289,13 +301,18 @@ impl Tool {
         self.reaction = reaction;
         let Felt { held, cuts } = std::mem::take(&mut self.told);
         let cuts = cuts && self.instrument == Instrument::Scalpel && self.is_pressed();
-        self.work = Work { bone: reaction.force, tissue, held, cuts, turns: self.spin != 0.0 };
+        let turns = self.spin != 0.0;
+        self.work = Work { bone: reaction.force, tissue, dura, held, cuts, turns };
     }
 }
 
 /// Posts a message to each of some objects.
-fn tell<C: Custom + 'static>(input: &mut Input<'_>, to: &[ObjectId], message: impl Fn() -> C) {
-    to.iter().for_each(|&to| input.post(to, Message::Custom(Box::new(message()))));
+fn tell<'a, C: Custom + 'static>(
+    input: &mut Input<'_>,
+    to: impl IntoIterator<Item = &'a ObjectId>,
+    message: impl Fn() -> C,
+) {
+    to.into_iter().for_each(|&to| input.post(to, Message::Custom(Box::new(message()))));
 }
 
 impl Behavior for Tool {

@@ -79,27 +79,11 @@ fn nearest(bone: &Volume, point: Vec3) -> Option<(f32, Vec3)> {
         let along = [number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1];
         Vec3::from_array(along.map(|component| component as f32)).normalize()
     });
-    let hit = |direction: Vec3| Some((ray(bone, point, direction)?, direction));
+    let hit = |direction: Vec3| Some((bone.cast(point, direction, REACH)?, direction));
     let (way, direction) = directions.filter_map(hit).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let place = point + direction * way;
     let normal = Felt::new(bone, place).normal.unwrap_or(-direction);
     Some(((point - place).dot(normal), normal))
-}
-
-/// How far a ray goes until it is in bone, in metres.
-fn ray(bone: &Volume, from: Vec3, direction: Vec3) -> Option<f32> {
-    let step = bone.spacing().min_element();
-    let steps = (REACH / step).ceil() as u32;
-    let ways = (1..=steps).map(|number| number as f32 * step);
-    let mut before = bone.density_at(from);
-    for way in ways {
-        let density = bone.density_at(from + direction * way);
-        if density >= 0.5 {
-            return Some(way - step * (density - 0.5) / (density - before));
-        }
-        before = density;
-    }
-    None
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! A mouse as the tool: positions are set from outside, forces go nowhere.
+//! A mouse as the tool: positions are set from outside, forces are only told.
 
 use std::fmt;
 
@@ -7,6 +7,10 @@ use glam::Vec3;
 
 use super::{DeviceDescription, DeviceError, DeviceSample, HapticDevice, Wrench};
 
+/// The greatest force that is computed, in newtons; usually 10, about what desktop devices exert.
+const FORCE: f32 = 10.0;
+/// The greatest stiffness by which it is, in newtons per metre; usually 2,000, likewise.
+const STIFFNESS: f32 = 2_000.0;
 /// A writer, one reader, and one slot to write into.
 const SLOTS: usize = 3;
 
@@ -43,12 +47,14 @@ impl MouseInput<'_> {
     }
 }
 
-/// A device whose positions are set by a [`MouseInput`].
+/// A device whose positions are set by a [`MouseInput`]. It exerts nothing; its forces are those that a
+/// usual desktop device would exert, for a person to see.
 pub struct MouseDevice<'c>(Reader<'c, DeviceSample, SLOTS>);
 
 impl HapticDevice for MouseDevice<'_> {
     fn description(&self) -> DeviceDescription {
-        DeviceDescription::without_forces("mouse")
+        let (max_force, max_stiffness) = (FORCE, STIFFNESS);
+        DeviceDescription { max_force, max_stiffness, ..DeviceDescription::without_forces("mouse") }
     }
 
     fn read(&mut self, _time: f64) -> Result<DeviceSample, DeviceError> {

@@ -4,6 +4,7 @@ mod bounds;
 mod cut;
 mod icosphere;
 mod mesh;
+mod ray;
 mod rigid;
 mod topology;
 mod vectors;

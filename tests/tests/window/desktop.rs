@@ -228,6 +228,17 @@ impl Session<'_> {
         self.desktop.fake(kind, 1, 0, 0);
     }
 
+    /// Clicks at a pixel of the window.
+    pub(crate) fn click(&mut self, x: i16, y: i16) {
+        self.move_to(x, y);
+        self.wait_until_still();
+        self.press(true);
+        // Seen by a picture, and less than what a press is long that is no click, 0.8 s.
+        sleep(2 * GLANCE);
+        self.press(false);
+        self.wait_until_still();
+    }
+
     /// Strikes the key of a symbol; letters are their own.
     pub(crate) fn strike(&self, symbol: char) {
         let code = self.desktop.keycode(symbol.into());
@@ -307,17 +318,21 @@ impl Screenshot {
         self.pixel(self.width - 1, self.height - 1) != [0; 3]
     }
 
-    /// The first of the overlay's sliders from above: the right end of its bar.
-    pub(crate) fn first_slider(&self) -> (usize, usize) {
-        // Where the bars of sliders are, and no border or text of anything else.
-        const WITHIN: (usize, usize) = (130, 165);
+    /// The overlay's sliders, from above: the right end of each one's bar.
+    pub(crate) fn sliders(&self) -> Vec<(i16, i16)> {
+        // Where the bars of sliders are, and no handle, border or text of anything else.
+        const WITHIN: (usize, usize) = (145, 165);
+        const HIGH: usize = 6;
         // Apart from the dithering.
         let is_bar = |x, y| self.pixel(x, y).iter().all(|color| (58..=62).contains(color));
         let is_row = |y| (WITHIN.0..WITHIN.1).all(|x| is_bar(x, y));
-        let top = (0..self.height - 6).find(|&top| (top..top + 6).all(is_row));
-        let y = top.expect("the overlay is shown") + 3;
-        let right = (WITHIN.1..self.width).find(|&x| !is_bar(x, y));
-        (right.expect("it ends") - 3, y)
+        let is_top = |&top: &usize| !is_row(top.saturating_sub(1)) && (top..top + HIGH).all(is_row);
+        let end = |top: usize| {
+            let y = top + HIGH / 2;
+            let right = (WITHIN.1..self.width).find(|&x| !is_bar(x, y)).unwrap_or(self.width);
+            (right as i16 - 3, y as i16)
+        };
+        (0..self.height - HIGH).filter(is_top).map(end).collect()
     }
 
     /// The number of pixels that another one of the same size has in another colour.

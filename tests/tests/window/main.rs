@@ -1,6 +1,8 @@
 //! The program's window, by what a person does to it and sees in it.
 #![forbid(unsafe_code)]
 
+mod controls;
+mod craniotomy;
 mod desktop;
 
 use std::collections::BTreeMap;
@@ -89,13 +91,8 @@ fn the_slider_of_gravity_lets_a_particle_fall() {
     // The overlay grows and shrinks with the number of workers at work.
     session.strike(' ');
     let paused = session.wait_until_still();
-    // It would not see a button that goes down and up between two pictures.
-    let (x, y) = paused.first_slider();
-    session.move_to(x as i16, y as i16);
-    session.press(true);
-    session.wait_until_still();
-    session.press(false);
-    session.wait_until_still();
+    let (right, y) = paused.sliders()[0];
+    session.click(right, y);
     session.strike('h');
     session.strike(' ');
     session.wait_until_lasting("the particle to lie on the floor", |now| middle(now).1 > FAR_DOWN);
@@ -113,12 +110,8 @@ fn what_a_person_does_replays() {
     let mut session = desktop.open(&[&ONE[..], &["--record", file]].concat());
     session.strike(' ');
     let paused = session.wait_until_still();
-    let (x, y) = paused.first_slider();
-    session.move_to(x as i16, y as i16);
-    session.press(true);
-    session.wait_until_still();
-    session.press(false);
-    session.wait_until_still();
+    let (right, y) = paused.sliders()[0];
+    session.click(right, y);
     session.strike('h');
     session.wait_until_still();
     session.move_to(MIDDLE.0, MIDDLE.1);

@@ -4,7 +4,7 @@ use dualframe_render_wgpu::look::Coloring;
 use dualframe_sim::executor::{Entry, ExecutorKind, MAX_THREADS};
 use dualframe_sim::pool::cores;
 
-use crate::app::args::Particles;
+use crate::app::args::Way;
 
 /// The most workers that can be asked for at the window: more than anybody has use for.
 pub(in crate::app) fn most_threads() -> usize {
@@ -14,24 +14,16 @@ pub(in crate::app) fn most_threads() -> usize {
 /// What the person at the window can change. The overlay writes it; between two runs of frames the
 /// session does what is new in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Controls {
+pub(in crate::app) struct Controls {
     pub(super) is_paused: bool,
     /// Frames to compute although paused.
     pub(super) steps: u64,
     /// Whether simulated time does not run ahead of the clock.
     pub(super) is_real_time: bool,
-    /// Downwards, in metres per second squared.
-    pub(super) gravity: f32,
-    /// Of the springs between nodes, in newtons per metre.
-    pub(super) stiffness: f32,
-    /// Of springs, in newton seconds per metre.
-    pub(super) damping: f32,
     pub(super) threads: usize,
     pub(super) frames_in_flight: u8,
     pub(super) executor: ExecutorKind,
     pub(super) coloring: Coloring,
-    /// Particles at the next start.
-    pub(super) objects: usize,
     /// How often it was started anew.
     pub(super) restarts: u32,
     /// Whether the overlay is shown.
@@ -39,20 +31,15 @@ pub(super) struct Controls {
 }
 
 impl Controls {
-    /// What a particle environment starts with; see [`dualframe_sim::scene::ParticleScene`].
-    pub(super) fn new(args: &Particles) -> Self {
+    pub(super) fn new(way: &Way) -> Self {
         Self {
             is_paused: false,
             steps: 0,
             is_real_time: true,
-            gravity: if args.gravity { 9.81 } else { 0.0 },
-            stiffness: 60.0,
-            damping: 0.02,
-            threads: args.way.threads,
-            frames_in_flight: args.way.frames_in_flight,
-            executor: args.way.executor,
+            threads: way.threads,
+            frames_in_flight: way.frames_in_flight,
+            executor: way.executor,
             coloring: Coloring::default(),
-            objects: args.objects,
             restarts: 0,
             is_shown: true,
         }

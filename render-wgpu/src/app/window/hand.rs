@@ -1,88 +1,117 @@
-//! The mouse as a hand: it looks around, and grabs and pulls objects.
+//! What a person at the window does to the environment.
 
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
-
-use dualframe_render_wgpu::pick::{Pick, Picked};
+use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::renderer::Painter;
 use dualframe_sim::mailbox::Mailbox;
-use dualframe_sim::message::Message;
+use dualframe_sim::object::Object;
+use egui::{Color32, Painter as Painter2d, Stroke, Ui, vec2};
 use glam::{Vec2, Vec3};
-use winit::event::MouseButton;
 
-/// How far the camera goes round for a mouse that crosses the window's height, in radians.
-const TURN: f32 = 3.5;
-/// The factor of the distance for one line of the wheel; usually 0.9.
-const ZOOM: f32 = 0.9;
-/// The stiffness of the hand's pull, in newtons per metre; usually 150, about what keeps a particle at
-/// the mouse without tearing at it.
-const PULL: f32 = 150.0;
+use super::controls::Controls;
 
-/// What the left button's press came to.
-enum Grip {
-    Nothing,
-    /// The device is asked what is under the mouse.
-    Asked(Receiver<Option<Picked>>),
-    /// An object, and where it was last pulled to.
-    Object(Picked, Option<Vec3>),
-    /// There was no object: dragging looks around.
-    Air,
+/// The width of a line over the picture, in points.
+const LINE: f32 = 1.5;
+
+/// Where the mouse points.
+pub(in crate::app) struct Aim<'a> {
+    pub(super) painter: &'a Painter,
+    pub(super) mailbox: &'a Mailbox,
+    /// From (−1, −1) at the lower left of the window to (1, 1).
+    pub(super) point: Vec2,
 }
 
-/// The mouse as a hand.
-pub(super) struct Hand(Grip);
-
-impl Hand {
-    pub(super) fn new() -> Self {
-        Self(Grip::Nothing)
+impl Aim<'_> {
+    /// The place under the mouse at the depth of `anchor`.
+    pub(super) fn at_depth_of(&self, anchor: Vec3) -> Vec3 {
+        self.painter.camera.unproject(self.point, self.aspect(), anchor)
     }
 
-    /// The left button went down at `point`, from (−1, −1) at the lower left to (1, 1).
-    pub(super) fn press(&mut self, painter: &Painter, point: Vec2) {
-        let (answer, answered) = channel();
-        // With the queue full of work nothing is grabbed this time.
-        let asked = painter.auxiliary().submit(Box::new(Pick { point, answer }));
-        self.0 = if asked.is_ok() { Grip::Asked(answered) } else { Grip::Air };
+    /// From where one looks, and the direction of what is under the mouse, of unit length.
+    pub(super) fn ray(&self) -> (Vec3, Vec3) {
+        let camera = &self.painter.camera;
+        (camera.eye(), camera.direction(self.point, self.aspect()))
     }
+
+    fn aspect(&self) -> f32 {
+        let (width, height) = self.painter.size();
+        width as f32 / height as f32
+    }
+}
+
+/// Lines over the picture.
+pub(in crate::app) struct Marks<'a> {
+    painter: Painter2d,
+    camera: &'a Camera,
+}
+
+impl<'a> Marks<'a> {
+    /// Over the whole picture, which was taken by a camera.
+    pub(super) fn new(painter: Painter2d, camera: &'a Camera) -> Self {
+        Self { painter, camera }
+    }
+
+    /// Draws a line along places on a surface, each with its outward normal, as far as they face the
+    /// person.
+    pub(super) fn line(&self, places: impl Iterator<Item = (Vec3, Vec3)>, color: Color32) {
+        let area = self.painter.clip_rect();
+        let projection = self.camera.view_projection(area.aspect_ratio());
+        let mut before = None;
+        for (place, normal) in places {
+            let is_seen = normal.dot(self.camera.eye() - place) > 0.0;
+            let seen = is_seen.then(|| {
+                let share = 0.5 * projection.project_point3(place) + 0.5;
+                area.lerp_inside(vec2(share.x, 1.0 - share.y))
+            });
+            if let (Some(from), Some(to)) = (before, seen) {
+                self.painter.line_segment([from, to], Stroke::new(LINE, color));
+            }
+            before = seen;
+        }
+    }
+}
+
+/// What a person does to the environment: with the mouse and keys, and with a part of the overlay of its
+/// own. Messages to objects are posted to the mailbox that it aims with.
+pub(in crate::app) trait Hand {
+    /// How the mouse and the keys are used, in a line or two of the overlay.
+    const HELP: &'static str;
+
+    /// Another environment is shown.
+    fn forget(&mut self);
+
+    /// The left button went down.
+    fn press(&mut self, aim: &Aim<'_>);
 
     /// The left button went up.
-    pub(super) fn release(&mut self, mailbox: &Mailbox) {
-        if let Grip::Object(picked, _) = std::mem::replace(&mut self.0, Grip::Nothing) {
-            mailbox.post(picked.object, Message::Release);
-        }
+    fn release(&mut self, aim: &Aim<'_>);
+
+    /// Whether dragging with the left button, and the wheel, are for what the hand holds, and not for the
+    /// camera.
+    fn is_busy(&self) -> bool;
+
+    /// The wheel turned by so many lines while the hand was busy; away from the person is positive.
+    fn wheel(&mut self, lines: f32) {
+        let _ = lines;
     }
 
-    /// The mouse moved by so much of the window's height, downwards positive.
-    pub(super) fn drag(&mut self, painter: &mut Painter, button: MouseButton, by: Vec2) {
-        let camera = &mut painter.camera;
-        match (button, &self.0) {
-            (MouseButton::Left, Grip::Air) | (MouseButton::Right, _) => {
-                camera.orbit(-TURN * by.x, TURN * by.y);
-            }
-            (MouseButton::Middle, _) => camera.pan(Vec2::new(by.x, -by.y)),
-            _ => {}
-        }
+    /// A key was struck that nothing else knows.
+    fn key(&mut self, key: char) {
+        let _ = key;
     }
 
-    /// The wheel turned by so many lines.
-    pub(super) fn wheel(&mut self, painter: &mut Painter, lines: f32) {
-        painter.camera.zoom(ZOOM.powf(lines));
+    /// The hand is shown every object of every frame.
+    fn see(&mut self, object: &Object) {
+        let _ = object;
     }
 
-    /// Hears what is under the mouse, and pulls at what is held towards `point`.
-    pub(super) fn hold(&mut self, painter: &Painter, mailbox: &Mailbox, point: Vec2, aspect: f32) {
-        if let Grip::Asked(answered) = &self.0 {
-            self.0 = match answered.try_recv() {
-                Ok(Some(picked)) => Grip::Object(picked, None),
-                Ok(None) | Err(TryRecvError::Disconnected) => Grip::Air,
-                Err(TryRecvError::Empty) => return,
-            };
-        }
-        if let Grip::Object(Picked { object, node, place }, pulled) = &mut self.0 {
-            let target = painter.camera.unproject(point, aspect, *place);
-            if pulled.replace(target) != Some(target) {
-                let (node, target) = (*node, target.to_array());
-                mailbox.post(*object, Message::Pull { node, target, stiffness: PULL });
-            }
-        }
+    /// All objects of a frame were shown, and the mouse is here now.
+    fn follow(&mut self, aim: &Aim<'_>);
+
+    /// Marks in the picture what the person should see.
+    fn mark(&self, marks: &Marks<'_>) {
+        let _ = marks;
     }
+
+    /// Lays out its part of the overlay.
+    fn panel(&mut self, ui: &mut Ui, controls: &mut Controls);
 }

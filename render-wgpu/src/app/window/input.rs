@@ -33,11 +33,12 @@ pub(super) enum Gesture {
     ResetCamera,
     /// Show the overlay, or hide it.
     Overlay,
+    /// Another key that is a character, as if without shift.
+    Key(char),
 }
 
 /// The window and what has come from it.
 pub(super) struct Input {
-    title: String,
     size: (u32, u32),
     pub(super) window: Option<Arc<Window>>,
     pub(super) egui: Option<State>,
@@ -52,9 +53,8 @@ pub(super) struct Input {
 }
 
 impl Input {
-    pub(super) fn new(title: String, size: (u32, u32)) -> Self {
+    pub(super) fn new(size: (u32, u32)) -> Self {
         Self {
-            title,
             size,
             window: None,
             egui: None,
@@ -87,6 +87,9 @@ impl Input {
             Key::Named(NamedKey::Home) => Some(Gesture::ResetCamera),
             Key::Character("n" | "N") => Some(Gesture::Step),
             Key::Character("h" | "H") => Some(Gesture::Overlay),
+            Key::Character(text) => {
+                text.chars().next().map(|key| Gesture::Key(key.to_ascii_lowercase()))
+            }
             _ => None,
         });
     }
@@ -99,7 +102,7 @@ impl ApplicationHandler for Input {
         }
         let (width, height) = self.size;
         let attributes = Window::default_attributes()
-            .with_title(self.title.clone())
+            .with_title("dualframe")
             .with_inner_size(LogicalSize::new(width, height));
         match event_loop.create_window(attributes) {
             Ok(window) => self.window = Some(Arc::new(window)),

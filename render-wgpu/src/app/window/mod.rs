@@ -2,14 +2,18 @@
 //!
 //! The main thread is worker number 0 and holds the render token. Frames run in short runs; between two
 //! of them is done what cannot be done while frames run. Events are looked at after every frame.
+//!
+//! What is shown, and what a person can do to it, is a [`Scenario`]; all else is the same for all.
 
 mod charts;
 mod controls;
+mod craniotomy;
 mod hand;
 mod input;
 mod overlay;
 mod pace;
 mod paint;
+mod particles;
 mod stats;
 mod surface;
 mod view;
@@ -19,25 +23,25 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
-use dualframe_render_wgpu::error::GraphicsError;
+use dualframe_render_wgpu::camera::Camera;
+use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::{ExecutorKind, FrameRecord};
 use dualframe_sim::manager::{Settings, VeManager};
-use dualframe_sim::message::Message;
-use dualframe_sim::object::ObjectId;
-use dualframe_sim::record::Control;
-use dualframe_sim::scene::{ParticleScene, Scene};
+use dualframe_sim::scene::Scene;
 use dualframe_sim::stages;
 use dualframe_sim::timeline::Timeline;
-use glam::Vec3;
 
 use self::controls::Controls;
 pub(super) use self::controls::most_threads;
+pub(super) use self::craniotomy::CraniotomyAtHand;
+use self::hand::Hand;
+pub(super) use self::particles::ParticlesAtHand;
 use self::view::{Shown, View};
-use crate::app::args::Particles;
-use crate::app::particles::{self, RunError};
-use crate::app::pictures;
-use crate::app::recording::Recording;
+use super::args::{Products, Way};
+use super::particles::RunError;
+use super::pictures;
+use super::recording::Recording;
 
 /// How long a run of frames takes, about; usually 50 ms: so late may controls take effect.
 const RUN_SECONDS: f32 = 0.05;
@@ -45,46 +49,93 @@ const RUN_SECONDS: f32 = 0.05;
 const RUN_FRAMES: u64 = 32;
 /// How long one waits for events while nothing moves.
 const IDLE: Duration = Duration::from_millis(100);
-/// The stiffness of springs to the centre over that of springs between nodes, in particles.
-const CENTER_STIFFNESS: f32 = 5.0;
+
+/// Makes a manager of a scene, by what the person has set.
+pub(super) type Manage<'a> = &'a dyn Fn(Scene) -> Result<VeManager, RunError>;
+
+/// What a window shows, and what a person can do to it.
+pub(super) trait Scenario {
+    /// The person's hand.
+    type Hand: Hand;
+
+    /// Its usual broad phase.
+    const GRAIN: Grain;
+
+    /// What it looks like, and from where it is seen at first.
+    fn look(&self, quality: Quality) -> (Look, Camera);
+
+    /// The environment, to begin anew.
+    fn build(&mut self, hand: &Self::Hand) -> Result<Scene, RunError>;
+
+    /// Does what is new in the hand's part of the overlay.
+    fn apply(
+        &mut self,
+        hand: &Self::Hand,
+        manager: &mut VeManager,
+        recording: &mut Recording<'_>,
+    ) -> Result<(), RunError>;
+
+    /// Advances by so many frames or fewer, but one at least.
+    fn advance(
+        &mut self,
+        view: &mut View<Self::Hand>,
+        manager: VeManager,
+        recording: &mut Recording<'_>,
+        frames: u64,
+        host: (&mut dyn FnMut(&FrameRecord), Manage<'_>),
+    ) -> Result<VeManager, RunError>;
+}
 
 /// A window and the environment in it.
-pub(super) struct Session<'a> {
-    args: &'a Particles,
-    view: View,
+pub(super) struct Session<'a, S: Scenario> {
+    scenario: S,
+    view: View<S::Hand>,
     /// What the environment was last told.
     applied: Controls,
-    /// Its particles.
-    objects: usize,
+    way: &'a Way,
     /// Is told what the person at the terminal should know.
     note: &'a dyn Fn(&str),
 }
 
-impl<'a> Session<'a> {
-    /// Opens a window.
+impl<'a, S: Scenario> Session<'a, S> {
+    /// Opens a window, where one is wanted and possible, of a scenario and a hand that are made
+    /// for it.
     ///
     /// # Errors
-    /// No display, no window, no adapter that can draw to it.
+    /// No display, no window, no adapter that can draw to it, where one was asked for; what `make` says.
     pub(super) fn open(
-        args: &'a Particles,
-        timeline: Arc<Timeline>,
+        make: impl FnOnce() -> Result<(S, S::Hand), RunError>,
+        (way, products): (&'a Way, &Products),
+        time_step: f32,
+        timeline: &Arc<Timeline>,
         note: &'a dyn Fn(&str),
-    ) -> Result<Self, GraphicsError> {
-        let scene = particles::scene_of(args, args.objects);
+    ) -> Result<Option<Self>, RunError> {
+        if !products.prefers_window() {
+            return Ok(None);
+        }
+        let (scenario, hand) = make()?;
+        let controls = Controls::new(way);
         let shown = Shown {
-            title: "dualframe".to_owned(),
-            size: args.products.size,
-            focus: scene.room(),
-            time_step: Duration::from_secs_f32(ParticleScene::TIME_STEP),
-            timeline,
+            size: products.size,
+            time_step: Duration::from_secs_f32(time_step),
+            timeline: Arc::clone(timeline),
+            hand,
         };
-        let controls = Controls::new(args);
-        let view = View::open(shown, args.products.adapter.as_deref(), controls)?;
-        Ok(Self { args, view, applied: controls, objects: args.objects, note })
+        let look = |quality| scenario.look(quality);
+        match View::open(shown, look, products.adapter.as_deref(), controls) {
+            Ok(view) => Ok(Some(Self { scenario, view, applied: controls, way, note })),
+            Err(error) if products.window => Err(error.into()),
+            Err(error) => {
+                note(&format!(
+                    "running without a window, since {error}; --picture FILE.png draws without one"
+                ));
+                Ok(None)
+            }
+        }
     }
 
     /// Runs the environment until the window is closed, or so many frames are done; gives back the
-    /// environment as it is then.
+    /// environment as it is then, and the scenario.
     ///
     /// # Errors
     /// The executor cannot go on, or the window can no longer be drawn to.
@@ -95,8 +146,8 @@ impl<'a> Session<'a> {
         frames: Option<u64>,
         picture: Option<&File>,
         on_frame: &mut dyn FnMut(&FrameRecord),
-    ) -> Result<VeManager, RunError> {
-        self.view.turn_to(self.view.painter.look.focus, manager.mailbox());
+    ) -> Result<(VeManager, S), RunError> {
+        self.view.turn_to(|_| None, manager.mailbox());
         let mut left = frames.unwrap_or(u64::MAX);
         while left > 0 && !self.view.is_closing() {
             manager = self.apply(manager, &mut recording)?;
@@ -109,9 +160,9 @@ impl<'a> Session<'a> {
                 self.stand_still(&manager);
                 continue;
             }
-            let count = wanted.min(left);
-            self.advance((&mut manager, &mut recording), count, on_frame)?;
-            left -= count;
+            let before = manager.frame();
+            manager = self.advance(manager, &mut recording, wanted.min(left), on_frame)?;
+            left -= manager.frame() - before;
         }
         recording.end(&manager)?;
         if let Some(failure) = self.view.failure() {
@@ -121,7 +172,7 @@ impl<'a> Session<'a> {
             self.take(&manager);
             pictures::write(&self.view.picture()?, file)?;
         }
-        Ok(manager)
+        Ok((manager, self.scenario))
     }
 
     fn frames_of_a_run(&self) -> u64 {
@@ -131,15 +182,19 @@ impl<'a> Session<'a> {
 
     fn advance(
         &mut self,
-        (manager, recording): (&mut VeManager, &mut Recording<'_>),
+        manager: VeManager,
+        recording: &mut Recording<'_>,
         frames: u64,
         on_frame: &mut dyn FnMut(&FrameRecord),
-    ) -> Result<(), RunError> {
+    ) -> Result<VeManager, RunError> {
         let stats = Rc::clone(&self.view.stats);
-        recording.run(manager, frames, &mut self.view, &mut |record| {
+        let mut on_frame = |record: &FrameRecord| {
             stats.borrow_mut().note(record);
             on_frame(record);
-        })
+        };
+        let manage = manage::<S>(self.way, self.applied, Arc::clone(&self.view.timeline));
+        let host = (&mut on_frame as &mut dyn FnMut(&FrameRecord), &manage as Manage<'_>);
+        self.scenario.advance(&mut self.view, manager, recording, frames, host)
     }
 
     /// Takes all objects as they are, to be drawn.
@@ -169,7 +224,7 @@ impl<'a> Session<'a> {
                 let frame = manager.frame();
                 (self.note)(&format!("the recording ends before frame {frame}: started anew"));
             }
-            return self.restart();
+            manager = self.restart()?;
         }
         let is_pipeline = now.executor == ExecutorKind::Pipeline;
         let is_rebuilt = now.executor != before.executor
@@ -179,49 +234,35 @@ impl<'a> Session<'a> {
             manager = self.manage(manager.into_scene())?;
         }
         manager.pool().resize(now.threads);
-        if now.gravity != before.gravity {
-            let gravity = Control::Gravity(Vec3::NEG_Y * now.gravity);
-            recording.control(&mut manager, gravity)?;
-        }
-        if now.stiffness != before.stiffness {
-            let (between_nodes, to_center) = (now.stiffness, now.stiffness * CENTER_STIFFNESS);
-            tell_all(&manager, self.objects, || Message::Stiffness { between_nodes, to_center });
-        }
-        if now.damping != before.damping {
-            tell_all(&manager, self.objects, || Message::Damping(now.damping));
-        }
+        self.scenario.apply(&self.view.hand, &mut manager, recording)?;
         Ok(manager)
     }
 
-    /// Starts anew with as many objects as asked for.
+    /// Starts anew.
     fn restart(&mut self) -> Result<VeManager, RunError> {
-        let now = self.view.controls;
-        self.objects = now.objects;
-        let particles = particles::scene_of(self.args, now.objects);
-        let mut scene = particles.build()?;
-        scene.stages.simd = self.args.way.simd();
-        scene.stages.gravity = Vec3::NEG_Y * now.gravity;
+        let scene = self.scenario.build(&self.view.hand)?;
         let manager = self.manage(scene)?;
-        let (between_nodes, to_center) = (now.stiffness, now.stiffness * CENTER_STIFFNESS);
-        tell_all(&manager, self.objects, || Message::Stiffness { between_nodes, to_center });
-        tell_all(&manager, self.objects, || Message::Damping(now.damping));
-        self.view.turn_to(particles.room(), manager.mailbox());
+        self.view.turn_to(|quality| Some(self.scenario.look(quality)), manager.mailbox());
         Ok(manager)
     }
 
     fn manage(&self, scene: Scene) -> Result<VeManager, RunError> {
-        let Controls { executor, threads, .. } = self.view.controls;
-        let entry = self.view.controls.entry();
-        let settings =
-            Settings { executor, threads, entry, ..self.args.way.settings(Grain::Spatial) };
-        let mut manager = VeManager::new(scene, settings)?;
-        manager.watch(Arc::clone(&self.view.timeline));
-        Ok(manager)
+        manage::<S>(self.way, self.applied, Arc::clone(&self.view.timeline))(scene)
     }
 }
 
-/// Posts a message to every particle.
-fn tell_all(manager: &VeManager, objects: usize, message: impl Fn() -> Message) {
-    let mailbox = manager.mailbox();
-    (0..objects as u32).for_each(|object| mailbox.post(ObjectId(object), message()));
+/// What makes a manager of a scene.
+fn manage<S: Scenario>(
+    way: &Way,
+    controls: Controls,
+    timeline: Arc<Timeline>,
+) -> impl Fn(Scene) -> Result<VeManager, RunError> {
+    let Controls { executor, threads, .. } = controls;
+    let entry = controls.entry();
+    let settings = Settings { executor, threads, entry, ..way.settings(S::GRAIN) };
+    move |scene| {
+        let mut manager = VeManager::new(scene, settings)?;
+        manager.watch(Arc::clone(&timeline));
+        Ok(manager)
+    }
 }

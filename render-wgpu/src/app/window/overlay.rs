@@ -2,14 +2,15 @@
 
 use std::time::Duration;
 
+use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::look::Coloring;
 use dualframe_sim::executor::ExecutorKind;
-use dualframe_sim::scene::ParticleScene;
 use dualframe_sim::timeline::{Span, Timeline};
-use egui::{Checkbox, ComboBox, DragValue, Grid, Slider, Ui};
+use egui::{Checkbox, ComboBox, Grid, LayerId, Slider, Ui};
 
 use super::charts;
 use super::controls::{Controls, most_threads};
+use super::hand::{Hand, Marks};
 use super::stats::Stats;
 
 /// How far back the timeline goes; usually 50 ms, some ten frames.
@@ -26,16 +27,18 @@ impl Overlay {
     }
 
     /// Lays the overlay out and takes what was changed into `controls`.
-    pub(super) fn show(
+    pub(super) fn show<H: Hand>(
         &mut self,
         ui: &mut Ui,
-        controls: &mut Controls,
+        (controls, hand): (&mut Controls, &mut H),
+        camera: &Camera,
         stats: &Stats,
         timeline: &Timeline,
     ) {
         if !controls.is_shown {
             return;
         }
+        hand.mark(&Marks::new(ui.ctx().layer_painter(LayerId::background()), camera));
         egui::Window::new("dualframe")
             .default_pos([12.0, 12.0])
             .default_width(300.0)
@@ -47,11 +50,12 @@ impl Overlay {
                 ui.separator();
                 run_controls(ui, controls);
                 ui.separator();
-                physics_controls(ui, controls);
+                hand.panel(ui, controls);
                 ui.separator();
                 executor_controls(ui, controls);
                 ui.separator();
-                ui.small("drag: pull or look round · middle: move · wheel: closer");
+                ui.small(H::HELP);
+                ui.small("right: look round · middle: move · wheel: closer");
                 ui.small("space: pause · n: next frame · home: look again · h: hide");
             });
     }
@@ -98,20 +102,6 @@ fn run_controls(ui: &mut Ui, controls: &mut Controls) {
     });
 }
 
-fn physics_controls(ui: &mut Ui, controls: &mut Controls) {
-    Grid::new("physics").num_columns(2).show(ui, |ui| {
-        ui.label("gravity");
-        ui.add(Slider::new(&mut controls.gravity, 0.0..=20.0).suffix(" m/s²"));
-        ui.end_row();
-        ui.label("stiffness");
-        ui.add(Slider::new(&mut controls.stiffness, 5.0..=120.0).suffix(" N/m"));
-        ui.end_row();
-        ui.label("damping");
-        ui.add(Slider::new(&mut controls.damping, 0.0..=0.1).suffix(" N·s/m"));
-        ui.end_row();
-    });
-}
-
 fn executor_controls(ui: &mut Ui, controls: &mut Controls) {
     Grid::new("executor").num_columns(2).show(ui, |ui| {
         ui.label("executor");
@@ -132,15 +122,6 @@ fn executor_controls(ui: &mut Ui, controls: &mut Controls) {
         ui.horizontal(|ui| {
             ui.selectable_value(&mut controls.frames_in_flight, 1, "1");
             ui.selectable_value(&mut controls.frames_in_flight, 2, "2");
-        });
-        ui.end_row();
-        ui.label("particles");
-        ui.horizontal(|ui| {
-            let objects = DragValue::new(&mut controls.objects);
-            ui.add(objects.range(1..=ParticleScene::MAX_OBJECTS).speed(10.0));
-            if ui.button("Restart").clicked() {
-                controls.restarts += 1;
-            }
         });
         ui.end_row();
     });

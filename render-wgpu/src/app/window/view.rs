@@ -12,7 +12,6 @@ use dualframe_render_wgpu::gpu::Gpu;
 use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_render_wgpu::picture::{Picture, read_texture};
 use dualframe_render_wgpu::renderer::Painter;
-use dualframe_sim::geometry::Bounds;
 use dualframe_sim::mailbox::Mailbox;
 use dualframe_sim::object::Object;
 use dualframe_sim::render::Renderer;
@@ -22,12 +21,13 @@ use wgpu::{
     CommandBuffer, Extent3d, Instance, InstanceDescriptor, Texture, TextureDescriptor,
     TextureDimension, TextureUsages,
 };
+use winit::event::MouseButton;
 use winit::event_loop::EventLoop;
 use winit::platform::pump_events::EventLoopExtPumpEvents;
 use winit::window::Window;
 
 use super::controls::Controls;
-use super::hand::Hand;
+use super::hand::{Aim, Hand};
 use super::input::{Gesture, Input};
 use super::overlay::Overlay;
 use super::pace::Pace;
@@ -35,8 +35,13 @@ use super::paint::OverlayPainter;
 use super::stats::Stats;
 use super::surface::{self, Screen};
 
+/// How far the camera goes round for a mouse that crosses the window's height, in radians.
+const TURN: f32 = 3.5;
+/// The factor of the distance for one line of the wheel; usually 0.9.
+const ZOOM: f32 = 0.9;
+
 /// The window as a renderer.
-pub(super) struct View {
+pub(in crate::app) struct View<H> {
     event_loop: EventLoop<()>,
     input: Input,
     window: Arc<Window>,
@@ -45,7 +50,7 @@ pub(super) struct View {
     pub(super) painter: Painter,
     overlay_painter: OverlayPainter,
     overlay: Overlay,
-    hand: Hand,
+    pub(super) hand: H,
     home: Camera,
     pub(super) controls: Controls,
     pub(super) stats: Rc<RefCell<Stats>>,
@@ -58,12 +63,12 @@ pub(super) struct View {
 }
 
 /// What a window shows.
-pub(super) struct Shown {
-    pub(super) title: String,
+pub(super) struct Shown<H> {
+    /// In pixels.
     pub(super) size: (u32, u32),
-    pub(super) focus: Bounds,
     pub(super) time_step: Duration,
     pub(super) timeline: Arc<Timeline>,
+    pub(super) hand: H,
 }
 
 /// Connects to the display. Winit panics where one of the libraries is missing that it loads only now,
@@ -84,19 +89,20 @@ fn event_loop() -> Result<EventLoop<()>, GraphicsError> {
     }
 }
 
-impl View {
+impl<H: Hand> View<H> {
     /// Opens a window.
     ///
     /// # Errors
     /// No display, no window, no adapter that can draw to it.
     pub(super) fn open(
-        shown: Shown,
+        shown: Shown<H>,
+        look: impl FnOnce(Quality) -> (Look, Camera),
         adapter: Option<&str>,
         controls: Controls,
     ) -> Result<Self, GraphicsError> {
         let refused = |reason: String| GraphicsError::Surface { reason };
         let mut event_loop = event_loop()?;
-        let mut input = Input::new(shown.title, shown.size);
+        let mut input = Input::new(shown.size);
         event_loop.pump_app_events(Some(Duration::from_millis(100)), &mut input);
         let window = match (input.window.clone(), input.failure.take()) {
             (Some(window), _) => window,
@@ -109,9 +115,9 @@ impl View {
         let screen = Screen::new(&gpu, surface, Arc::clone(&window))?;
         let overlay_painter = OverlayPainter::new(&gpu, screen.format());
         input.egui = Some(overlay_painter.input(&gpu, &window));
-        let quality = if gpu.is_software() { Quality::Fast } else { Quality::Fine };
-        let look = Look::room(shown.focus, quality);
-        let painter = Painter::new(gpu, look, screen.format(), screen.size())?;
+        let (look, home) = look(quality_for(&gpu));
+        let mut painter = Painter::new(gpu, look, screen.format(), screen.size())?;
+        painter.camera = home;
         let refresh =
             window.current_monitor().and_then(|monitor| monitor.refresh_rate_millihertz());
         let refresh = refresh.map(|rate| f64::from(rate.max(1_000)) * 1e-3);
@@ -121,11 +127,11 @@ impl View {
             window,
             instance,
             screen,
-            home: painter.camera,
+            home,
             painter,
             overlay_painter,
             overlay: Overlay::new(),
-            hand: Hand::new(),
+            hand: shown.hand,
             controls,
             stats: Rc::new(RefCell::new(Stats::new())),
             timeline: shown.timeline,
@@ -146,15 +152,21 @@ impl View {
         self.failure.clone().or_else(|| self.painter.failure())
     }
 
-    /// Another environment is shown.
-    pub(super) fn turn_to(&mut self, focus: Bounds, mailbox: Mailbox) {
-        if self.painter.look.focus != focus {
-            self.painter.look.focus = focus;
-            self.painter.camera = Camera::around(&focus);
-            self.home = self.painter.camera;
+    /// Another environment is shown. Where `look` says nothing else, it looks as it did.
+    pub(super) fn turn_to(
+        &mut self,
+        look: impl FnOnce(Quality) -> Option<(Look, Camera)>,
+        mailbox: Mailbox,
+    ) {
+        let before = self.painter.look.focus;
+        if let Some((look, home)) = look(quality_for(self.painter.gpu()))
+            && look.focus != before
+        {
+            self.painter.look = look;
+            (self.painter.camera, self.home) = (home, home);
         }
         self.mailbox = mailbox;
-        self.hand = Hand::new();
+        self.hand.forget();
     }
 
     /// Does what the person did, after waiting for it for up to `timeout`.
@@ -166,8 +178,8 @@ impl View {
         }
         // The list keeps its memory.
         self.input.gestures = gestures;
-        let (point, aspect) = (self.point_at(self.input.cursor), self.aspect());
-        self.hand.hold(&self.painter, &self.mailbox, point, aspect);
+        let (hand, aim) = self.aimed(self.input.cursor);
+        hand.follow(&aim);
         if !self.is_closing() && self.screen.follow(self.painter.gpu()) {
             let (width, height) = self.screen.size();
             if let Err(error) = self.painter.resize(width, height) {
@@ -178,35 +190,46 @@ impl View {
     }
 
     fn act(&mut self, gesture: Gesture) {
-        let Self { hand, painter, controls, .. } = self;
+        let Self { hand, painter, controls, input, .. } = self;
+        let camera = &mut painter.camera;
         match gesture {
             Gesture::Press(cursor) => {
-                let point = self.point_at(cursor);
-                self.hand.press(&self.painter, point);
+                let (hand, aim) = self.aimed(cursor);
+                hand.press(&aim);
             }
-            Gesture::Release => hand.release(&self.mailbox),
+            Gesture::Release => {
+                let cursor = input.cursor;
+                let (hand, aim) = self.aimed(cursor);
+                hand.release(&aim);
+            }
+            Gesture::Drag(MouseButton::Left, _) if hand.is_busy() => {}
             Gesture::Drag(button, by) => {
-                let height = painter.size().1 as f32;
-                hand.drag(painter, button, by / height);
+                let by = by / painter.size().1 as f32;
+                match button {
+                    MouseButton::Left | MouseButton::Right => {
+                        painter.camera.orbit(-TURN * by.x, TURN * by.y);
+                    }
+                    MouseButton::Middle => painter.camera.pan(Vec2::new(by.x, -by.y)),
+                    _ => {}
+                }
             }
-            Gesture::Wheel(lines) => hand.wheel(painter, lines),
+            Gesture::Wheel(lines) if hand.is_busy() => hand.wheel(lines),
+            Gesture::Wheel(lines) => camera.zoom(ZOOM.powf(lines)),
             Gesture::Pause => controls.is_paused = !controls.is_paused,
             Gesture::Step => controls.steps += u64::from(controls.is_paused),
-            Gesture::ResetCamera => painter.camera = self.home,
+            Gesture::ResetCamera => *camera = self.home,
             Gesture::Overlay => controls.is_shown = !controls.is_shown,
+            Gesture::Key(key) => hand.key(key),
         }
     }
 
-    /// A pixel of the window, from (−1, −1) at the lower left to (1, 1).
-    fn point_at(&self, cursor: Vec2) -> Vec2 {
-        let (width, height) = self.painter.size();
+    /// The hand, and what it aims at with the mouse at a pixel of the window.
+    fn aimed(&mut self, cursor: Vec2) -> (&mut H, Aim<'_>) {
+        let Self { hand, painter, mailbox, .. } = self;
+        let (width, height) = painter.size();
         let share = cursor / Vec2::new(width as f32, height as f32);
-        Vec2::new(2.0 * share.x - 1.0, 1.0 - 2.0 * share.y)
-    }
-
-    fn aspect(&self) -> f32 {
-        let (width, height) = self.painter.size();
-        width as f32 / height as f32
+        let point = Vec2::new(2.0 * share.x - 1.0, 1.0 - 2.0 * share.y);
+        (hand, Aim { painter, mailbox, point })
     }
 
     /// The objects that come next are shown.
@@ -246,13 +269,16 @@ impl View {
         let picture = texture.create_view(&Default::default());
         let mut encoder = self.painter.gpu().device.create_command_encoder(&Default::default());
         self.painter.paint(&mut encoder, &picture);
-        let Self { painter, overlay_painter, overlay, input, controls, stats, timeline, .. } = self;
+        let Self {
+            painter, overlay_painter, overlay, input, controls, hand, stats, timeline, ..
+        } = self;
+        let camera = painter.camera;
         let mut commands = match &mut input.egui {
             Some(egui) => overlay_painter.paint(
                 painter.gpu(),
                 (&self.window, egui),
                 (&mut encoder, &picture),
-                |ui| overlay.show(ui, controls, &stats.borrow(), timeline),
+                |ui| overlay.show(ui, (controls, hand), &camera, &stats.borrow(), timeline),
             ),
             None => Vec::new(),
         };
@@ -286,8 +312,14 @@ impl View {
     }
 }
 
-impl Renderer for View {
+/// What an adapter can draw often enough.
+fn quality_for(gpu: &Gpu) -> Quality {
+    if gpu.is_software() { Quality::Fast } else { Quality::Fine }
+}
+
+impl<H: Hand> Renderer for View<H> {
     fn draw(&mut self, object: &Object) {
+        self.hand.see(object);
         if self.is_shown {
             self.painter.add(object);
         }

@@ -1,7 +1,7 @@
 //! A piece of bone that came free: a rigid body that can be lifted out, drilled, and put back.
 
 mod body;
-mod grasp;
+mod hands;
 mod samples;
 
 use std::hash::Hasher;
@@ -9,7 +9,7 @@ use std::hash::Hasher;
 use glam::Vec3;
 use parry3d::math::Pose;
 
-use self::grasp::Hands;
+use self::hands::Hands;
 use super::drill::Erosions;
 use super::{Behavior, Felt, Input};
 use crate::geometry::{Geometry, Volume};
@@ -18,7 +18,6 @@ use crate::message::Message;
 use crate::object::ObjectId;
 
 pub use body::{BONE_DENSITY, Body};
-pub use grasp::{Grasp, Hold, LetGo};
 pub(crate) use samples::MOST_SAMPLES;
 
 /// The force that it takes to lift a piece out of its place, in newtons; usually 3: the dura sticks to it.
@@ -77,6 +76,12 @@ impl Piece {
     pub fn spinning(mut self, angular_momentum: Vec3) -> Self {
         self.body.angular_momentum = angular_momentum;
         self
+    }
+
+    /// The pose in its place, if it has one.
+    #[must_use]
+    pub fn seat(&self) -> Option<Pose> {
+        self.seat
     }
 
     /// Whether it lies in its place.

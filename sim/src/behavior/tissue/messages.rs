@@ -1,4 +1,4 @@
-//! What tools do to tissue, as messages.
+//! What tools do to tissue, as messages; how they hold it is a matter of [`Grasp`].
 //!
 //! A tool posts them by [`Input::post`] as [`Message::Custom`], a host by the mailbox. What is no
 //! tissue ignores them, and so does tissue if a number in them is not finite or is negative where that
@@ -13,43 +13,10 @@ use glam::Vec3;
 
 use super::Tissue;
 use super::anchors::Grip;
-use crate::geometry::{Blade, Mesh, Sweep};
+use crate::behavior::grasp::{Grasp, Hold, Holdable};
+use crate::geometry::{Blade, Geometry, Mesh, Sweep};
 use crate::message::Custom;
 use crate::object::{Object, ObjectId};
-
-/// Takes hold of the nodes within a ball as they are now; a tool that held others lets go of them.
-///
-/// Each node is held by a spring of its own to a point that moves with the tool.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Grasp {
-    /// The tool.
-    pub by: ObjectId,
-    /// The middle of the ball, and where the tool is, in metres.
-    pub point: Vec3,
-    /// The ball's radius, in metres; usually 0.003 to 0.006.
-    pub radius: f32,
-    /// Of each node's spring, in newtons per metre; usually 100 to 1,000, possibly infinite.
-    pub stiffness: f32,
-    /// The greatest force on a node, in newtons, beyond which it slips off; usually 0.5 to 5, possibly
-    /// infinite.
-    pub strength: f32,
-}
-
-/// Moves a tool that holds tissue: what it holds is to follow within the next frame, evenly.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hold {
-    /// The tool.
-    pub by: ObjectId,
-    /// Where it is, in metres, on the same point of it as in [`Grasp`].
-    pub position: Vec3,
-}
-
-/// Lets go of all that a tool holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LetGo {
-    /// The tool.
-    pub by: ObjectId,
-}
 
 /// Breaks the pins of all nodes in a ball: tissue is scraped off what it has grown onto.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,10 +48,10 @@ fn tissue(object: &mut Object) -> Option<(&mut Tissue, &mut Mesh)> {
     Some((behavior.downcast_mut::<Tissue>()?, object.geometry.as_mesh_mut()?))
 }
 
-impl Custom for Grasp {
-    fn process(&self, object: &mut Object) {
-        let Some((tissue, mesh)) = tissue(object) else { return };
-        let &Self { by, point, radius, stiffness, strength } = self;
+impl Holdable for Tissue {
+    fn take(&mut self, geometry: &Geometry, grasp: &Grasp) {
+        let Some(mesh) = geometry.as_mesh() else { return };
+        let &Grasp { by, point, radius, stiffness, strength } = grasp;
         if !(point.is_finite() && radius >= 0.0 && stiffness > 0.0 && strength >= 0.0) {
             return;
         }
@@ -92,25 +59,17 @@ impl Custom for Grasp {
         let offsets = (0..).zip(mesh.positions.iter().map(|position| position - point));
         let nodes = offsets.filter(near).collect();
         let force = Vec3::ZERO;
-        tissue.anchors.take(Grip { by, from: point, to: point, stiffness, strength, nodes, force });
+        self.anchors.take(Grip { by, from: point, to: point, stiffness, strength, nodes, force });
     }
-}
 
-impl Custom for Hold {
-    fn process(&self, object: &mut Object) {
-        let Some((tissue, _)) = tissue(object) else { return };
-        let grip = tissue.anchors.grip_mut(self.by);
-        if let Some(grip) = grip.filter(|_| self.position.is_finite()) {
-            grip.to = self.position;
+    fn hold(&mut self, hold: &Hold) {
+        if let Some(grip) = self.anchors.grip_mut(hold.by) {
+            grip.to = hold.position;
         }
     }
-}
 
-impl Custom for LetGo {
-    fn process(&self, object: &mut Object) {
-        if let Some((tissue, _)) = tissue(object) {
-            tissue.anchors.let_go(self.by);
-        }
+    fn let_go(&mut self, by: ObjectId) {
+        self.anchors.let_go(by);
     }
 }
 

@@ -25,7 +25,7 @@ use crate::object::{Object, ObjectId};
 
 pub use anchors::Pin;
 pub use material::{Material, TissueError};
-pub use messages::{Cut, Grasp, Hold, LetGo, Scrape};
+pub use messages::{Cut, Scrape};
 
 /// The shortest edge that cutting leaves, as a share of the mean edge at the start; usually 0.1.
 const SHORTEST: f32 = 0.1;
@@ -41,6 +41,10 @@ const SHORTEST: f32 = 0.1;
 /// [`Message::Damping`] (as [`Material::damping`], per second), and [`Message::Pull`] and
 /// [`Message::Release`], by which the host holds one node at a point. What tools do comes as [`Grasp`],
 /// [`Hold`], [`LetGo`], [`Scrape`] and [`Cut`].
+///
+/// [`Grasp`]: super::Grasp
+/// [`Hold`]: super::Hold
+/// [`LetGo`]: super::LetGo
 #[derive(Clone, Debug)]
 pub struct Tissue {
     material: Material,

@@ -104,9 +104,13 @@ fn tool(id: ObjectId, head: &Head) -> Object {
     let aside =
         outward.cross(Vec3::Z).normalize_or(Vec3::X) * if id == TOOLS[0] { 0.05 } else { -0.05 };
     let place = head.plan.middle.point + outward * 0.08 + aside;
-    let tissue = |number: &usize| head.structures[*number].form == Form::Sheet;
+    let all = |is: fn(&Structure) -> bool| {
+        let numbers = 0..head.structures.len();
+        numbers.filter(|&number| is(&head.structures[number])).map(structure_id).collect()
+    };
     let workpieces = Workpieces {
-        tissue: (0..head.structures.len()).filter(tissue).map(structure_id).collect(),
+        tissue: all(|structure| structure.form == Form::Sheet),
+        dura: all(|structure| structure.layer == Layer::Dura),
         bone: vec![SKULL],
         pieces: Vec::new(),
     };

@@ -81,6 +81,10 @@ impl<'c> Feel<'c> {
         Self { end, now, past, tool, proxies, rest, shift, grasp, drags }
     }
 
+    pub(super) fn into_end(self) -> SimulationEnd<'c> {
+        self.end
+    }
+
     /// The device at the last swap; none as long as its loop said nothing.
     pub(super) fn device(&self) -> Option<&ToolState> {
         self.past.back()

@@ -46,7 +46,7 @@ pub(super) fn free(scene: &mut Scene, skull: ObjectId, region: &Bounds) -> usize
 }
 
 /// The voxels of a box in the world.
-fn voxels(volume: &Volume, region: &Bounds) -> [Range<u32>; 3] {
+pub(super) fn voxels(volume: &Volume, region: &Bounds) -> [Range<u32>; 3] {
     let corners = (0..8).map(|corner| {
         let side = |axis: usize| {
             if corner >> axis & 1 == 1 { region.max[axis] } else { region.min[axis] }

@@ -8,10 +8,12 @@
 //! | `feel` | joins a hand with a haptic loop, so that it moves a tool and feels it |
 //! | `freeing` | bone that a closed cut has freed becomes an object of its own |
 //! | [`Score`] | what educators measure |
+//! | `opening` | how the opening in the skull came out, beside the plan |
 
 mod build;
 mod feel;
 mod freeing;
+mod opening;
 mod operation;
 mod score;
 mod script;
@@ -20,8 +22,9 @@ mod steps;
 use crate::object::{Group, ObjectId};
 
 pub use build::{BuildError, build};
+pub use opening::Margin;
 pub use operation::{LOOK_FRAMES, Operation};
-pub use score::{Report, Score};
+pub use score::{Placement, Report, Score};
 pub use steps::Step;
 
 use super::head::Head;

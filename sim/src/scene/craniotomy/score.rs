@@ -2,8 +2,10 @@
 
 use glam::Vec3;
 
+use super::opening::{Margin, Opening};
 use crate::behavior::{Instrument, Tool};
 use crate::object::Object;
+use crate::scene::head::Entry;
 
 /// The steps in which forces are counted, in newtons; usually 0.25.
 const FORCE_STEP: f32 = 0.25;
@@ -13,7 +15,7 @@ const FORCE_STEPS: usize = 400;
 /// 1 mm: half a millimetre of dura, and what it yields.
 const DURA_GIVES: f32 = 0.001;
 
-/// What is counted while an operation goes on; see [`Score::report`].
+/// What is counted while an operation goes on; see [`Operation::report`](super::Operation::report).
 #[derive(Clone, Debug)]
 pub struct Score {
     time_step: f32,
@@ -24,11 +26,25 @@ pub struct Score {
     forces: Vec<u32>,
     peak: f32,
     tissue_peak: f32,
+    dura_peak: f32,
     plunge: f32,
     tears: u32,
     tear: f32,
     /// Where each tool's bit is in the dura, if it is.
     inside: [Option<Vec3>; 2],
+    /// Whether each tool is a perforator that drills.
+    perforates: [bool; 2],
+    /// Where the last burr hole was begun, and the direction from there to the hand.
+    hole: Option<(Vec3, Vec3)>,
+}
+
+/// How a burr hole was drilled, beside the plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// How far from the planned entry the bit's axis goes through the outer table, in metres.
+    pub error: f32,
+    /// The angle between that axis and the planned direction, in radians.
+    pub angle: f32,
 }
 
 /// What educators measure, so far (NeuroTouch; the CNS craniotomy simulator).
@@ -46,12 +62,22 @@ pub struct Report {
     pub force_p95: f32,
     /// The greatest force of soft tissue on a tool, in newtons.
     pub peak_tissue_force: f32,
-    /// How far past the inner table a bit came, in metres.
+    /// The greatest force of the dura on a tool, in newtons.
+    pub peak_dural_force: f32,
+    /// How far past the inner table a turning bit without a foot came, in metres.
     pub plunge: f32,
-    /// How often a turning bit came into the dura.
+    /// How often such a bit came into the dura: more than a millimetre past the inner table. The dura itself
+    /// gives way to bits and is never torn.
     pub dural_tears: u32,
-    /// How far bits went in it, in metres.
+    /// How far they went in it, in metres.
     pub dural_tear_length: f32,
+    /// How the last burr hole was begun; none without one.
+    pub burr_hole: Option<Placement>,
+    /// The opening's edge; none before there is one.
+    pub margin: Option<Margin>,
+    /// The bone that was drilled away more than a millimetre beside the planned cut and burr hole, in cubic
+    /// metres of full bone.
+    pub bone_outside_plan: f64,
 }
 
 impl Score {
@@ -66,10 +92,13 @@ impl Score {
             forces: vec![0; FORCE_STEPS],
             peak: 0.0,
             tissue_peak: 0.0,
+            dura_peak: 0.0,
             plunge: 0.0,
             tears: 0,
             tear: 0.0,
             inside: [None; 2],
+            perforates: [false; 2],
+            hole: None,
         }
     }
 
@@ -84,22 +113,29 @@ impl Score {
         let (Some(tool), Some(rigid)) = (Tool::of(tool), tool.geometry.as_rigid()) else { return };
         let work = tool.work();
         self.tissue_peak = self.tissue_peak.max(work.tissue.length());
+        self.dura_peak = self.dura_peak.max(work.dura.length());
         let tip = rigid.pose.translation;
         if !work.turns {
-            self.inside[hand] = None;
+            (self.inside[hand], self.perforates[hand]) = (None, false);
             return;
         }
         let force = work.bone.length();
+        let perforates = tool.instrument() == Instrument::Perforator && force > 0.0;
+        if perforates && !self.perforates[hand] {
+            self.hole = Some((tip, rigid.pose.rotation * Vec3::Z));
+        }
+        self.perforates[hand] = perforates;
         self.drilling += 1;
         self.in_air += u64::from(force == 0.0);
         // As an integer, what is not a number becomes 0.
         let step = (force / FORCE_STEP) as usize;
         self.forces[step.min(FORCE_STEPS - 1)] += 1;
         self.peak = self.peak.max(force);
-        let past = past_inner_table(tip);
+        // A craniotome's foot is meant to go there, and lifts the dura off its bit.
+        let has_foot = tool.instrument() == Instrument::Craniotome;
+        let past = if has_foot { 0.0 } else { past_inner_table(tip) };
         self.plunge = self.plunge.max(past);
-        // A craniotome's foot lifts the dura off its bit.
-        let tears = past > DURA_GIVES && tool.instrument() != Instrument::Craniotome;
+        let tears = past > DURA_GIVES;
         match (self.inside[hand], tears) {
             (None, true) => self.tears += 1,
             (Some(before), true) => self.tear += before.distance(tip),
@@ -108,9 +144,8 @@ impl Score {
         self.inside[hand] = tears.then_some(tip);
     }
 
-    /// What was measured so far.
-    #[must_use]
-    pub fn report(&self) -> Report {
+    /// What was measured so far; `planned` is the burr hole.
+    pub(super) fn report(&self, planned: &Entry, opening: &Opening<'_>) -> Report {
         let seconds = |frames: u64| frames as f64 * f64::from(self.time_step);
         Report {
             seconds: seconds(self.frames),
@@ -120,8 +155,12 @@ impl Score {
             force_p95: self.percentile(0.95),
             peak_tissue_force: self.tissue_peak,
             plunge: self.plunge,
+            peak_dural_force: self.dura_peak,
             dural_tears: self.tears,
             dural_tear_length: self.tear,
+            burr_hole: self.hole.map(|hole| placement(hole, planned)),
+            margin: opening.margin(),
+            bone_outside_plan: opening.outside(),
         }
     }
 
@@ -135,4 +174,12 @@ impl Score {
         });
         if self.drilling == 0 { 0.0 } else { (step.unwrap_or(0) + 1) as f32 * FORCE_STEP }
     }
+}
+
+/// Beside the plan, a hole that was begun with the tip at a place and the handle in a direction.
+fn placement((tip, axis): (Vec3, Vec3), planned: &Entry) -> Placement {
+    let Entry { point, inward, .. } = *planned;
+    // Along the axis to the plane that touches the outer table at the planned entry.
+    let entry = tip - axis * ((tip - point).dot(inward) / axis.dot(inward));
+    Placement { error: entry.distance(point), angle: axis.angle_between(-inward) }
 }

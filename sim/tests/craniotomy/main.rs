@@ -2,6 +2,8 @@
 #![cfg(feature = "image")]
 #![forbid(unsafe_code)]
 
+mod score;
+
 use std::any::Any;
 use std::sync::{Arc, OnceLock};
 
@@ -14,7 +16,7 @@ use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::object::{Object, ObjectId};
 use dualframe_sim::render::NullRenderer;
 use dualframe_sim::scene::craniotomy::{
-    FIRST_STRUCTURE, LOOK_FRAMES, Operation, SKULL, Step, TOOLS, build,
+    FIRST_STRUCTURE, LOOK_FRAMES, Operation, Report, SKULL, Step, TOOLS, build,
 };
 use dualframe_sim::scene::head::{Form, Head};
 use glam::Vec3;
@@ -62,6 +64,10 @@ impl Theatre {
         }
         assert!(self.manager.quarantined().is_empty());
         self
+    }
+
+    fn report(&self) -> Report {
+        self.operation.report(|see| self.manager.visit(see))
     }
 
     fn read<T>(&self, id: ObjectId, mut read: impl FnMut(&Object) -> T) -> T {
@@ -159,7 +165,7 @@ fn the_bone_is_bare(theatre: &Theatre) {
 /// The perforator stopped by itself within 1 mm of the inner table, and the hole is through.
 fn the_burr_hole_is_through(theatre: &Theatre) {
     let entry = head().plan.burr_hole;
-    let plunge = theatre.operation.report().plunge;
+    let plunge = theatre.report().plunge;
     assert!(plunge < 0.001, "the perforator came {plunge} m past the inner table");
     let open = theatre.read(SKULL, |skull| {
         let volume = skull.geometry.as_volume().expect("bone");
@@ -199,6 +205,18 @@ fn the_flap_is_lifted(theatre: &Theatre) {
     let after = full(SKULL) + full(PIECE) + removed(SKULL) + removed(PIECE);
     assert_eq!(after, before);
     assert!(full(PIECE) > 255 * 8 * 5_000, "the flap is less than 5 cm³");
+    as_planned(&theatre.report());
+}
+
+/// Hands that follow the plan are where it says.
+fn as_planned(report: &Report) {
+    let margin = report.margin.expect("the flap has an edge");
+    assert!(margin.mean < 0.000_5 && margin.greatest < 0.001_5, "{margin:?}");
+    assert!(margin.cut > 0.95, "{margin:?}");
+    let hole = report.burr_hole.expect("a hole was drilled");
+    assert!(hole.error < 0.000_5 && hole.angle < 0.01, "{hole:?}");
+    assert!(report.bone_outside_plan < 50e-9, "{} m³", report.bone_outside_plan);
+    assert_eq!(report.dural_tears, 0);
 }
 
 #[test]

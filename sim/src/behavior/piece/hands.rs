@@ -1,76 +1,31 @@
 //! How tools hold a piece.
 
-use std::any::Any;
 use std::hash::Hasher;
 
 use glam::{Mat3, Vec3};
 
 use super::Piece;
 use super::body::Body;
-use crate::geometry::Volume;
-use crate::message::Custom;
-use crate::object::{Object, ObjectId};
+use crate::behavior::grasp::{Grasp, Hold, Holdable};
+use crate::geometry::{Geometry, Volume};
+use crate::object::ObjectId;
 
-/// A message to a piece: a tool takes hold of it. What is no piece, or has no bone there, ignores it; a
-/// tool that holds it already takes hold anew.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Grasp {
-    /// The tool.
-    pub by: ObjectId,
-    /// Where, in metres. The point is held there until [`Hold`] says where to.
-    pub point: [f32; 3],
-    /// Within how many metres of the point there must be bone; usually 0.003.
-    pub radius: f32,
-    /// Of the hold, in newtons per metre; usually 1,000. Any stiffness is stable.
-    pub stiffness: f32,
-    /// The greatest force that the hold bears, in newtons; usually 20.
-    pub strength: f32,
-}
-
-/// A message to a piece: a tool that holds it moves the place held.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hold {
-    /// The tool.
-    pub by: ObjectId,
-    /// To where, in metres.
-    pub position: [f32; 3],
-}
-
-/// A message to a piece: a tool lets go of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LetGo {
-    /// The tool.
-    pub by: ObjectId,
-}
-
-impl Custom for Grasp {
-    fn process(&self, object: &mut Object) {
-        let Some(volume) = object.geometry.as_volume() else { return };
-        let hand = Hand::new(self, volume);
-        if let (Some(piece), Some(hand)) = (piece(&mut *object.behavior), hand) {
-            piece.hands.take(hand);
+impl Holdable for Piece {
+    fn take(&mut self, geometry: &Geometry, grasp: &Grasp) {
+        if let Some(hand) = geometry.as_volume().and_then(|volume| Hand::new(grasp, volume)) {
+            self.hands.take(hand);
         }
     }
-}
 
-impl Custom for Hold {
-    fn process(&self, object: &mut Object) {
-        if let Some(piece) = piece(&mut *object.behavior) {
-            piece.hands.hold(self.by, Vec3::from_array(self.position));
+    fn hold(&mut self, hold: &Hold) {
+        if let Some(hand) = self.hands.0.iter_mut().find(|hand| hand.by == hold.by) {
+            hand.target = hold.position;
         }
     }
-}
 
-impl Custom for LetGo {
-    fn process(&self, object: &mut Object) {
-        if let Some(piece) = piece(&mut *object.behavior) {
-            piece.hands.let_go(self.by);
-        }
+    fn let_go(&mut self, by: ObjectId) {
+        self.hands.0.retain(|hand| hand.by != by);
     }
-}
-
-fn piece(behavior: &mut dyn Any) -> Option<&mut Piece> {
-    behavior.downcast_mut()
 }
 
 /// The tools that hold a piece, in the order of their numbers.
@@ -91,8 +46,7 @@ struct Hand {
 
 impl Hand {
     fn new(grasp: &Grasp, volume: &Volume) -> Option<Self> {
-        let Grasp { by, point, radius, stiffness, strength } = *grasp;
-        let target = Vec3::from_array(point);
+        let Grasp { by, point: target, radius, stiffness, strength } = *grasp;
         let positive = |value: f32| value > 0.0 && value.is_finite();
         let mut there = false;
         volume.visit(target, radius, |voxel| there |= voxel.density >= 128);
@@ -136,16 +90,6 @@ impl Hands {
             Ok(place) => self.0[place] = hand,
             Err(place) => self.0.insert(place, hand),
         }
-    }
-
-    fn hold(&mut self, by: ObjectId, target: Vec3) {
-        if let Some(hand) = self.0.iter_mut().find(|hand| hand.by == by && target.is_finite()) {
-            hand.target = target;
-        }
-    }
-
-    fn let_go(&mut self, by: ObjectId) {
-        self.0.retain(|hand| hand.by != by);
     }
 
     /// The tools, in ascending order.

@@ -1,0 +1,103 @@
+//! Particles in a window: grabbed, pulled, and changed while they move.
+
+mod grip;
+mod physics;
+
+use dualframe_render_wgpu::camera::Camera;
+use dualframe_render_wgpu::look::{Look, Quality};
+use dualframe_sim::blocking::Grain;
+use dualframe_sim::executor::FrameRecord;
+use dualframe_sim::manager::VeManager;
+use dualframe_sim::message::Message;
+use dualframe_sim::object::ObjectId;
+use dualframe_sim::record::Control;
+use dualframe_sim::scene::Scene;
+use glam::Vec3;
+
+use self::grip::Grip;
+use self::physics::Physics;
+use super::view::View;
+use super::{Manage, Scenario};
+use crate::app::args::Particles;
+use crate::app::particles::{self, RunError};
+use crate::app::recording::Recording;
+
+/// The stiffness of springs to the centre over that of springs between nodes, in particles.
+const CENTER_STIFFNESS: f32 = 5.0;
+
+/// Particles in a window.
+pub(in crate::app) struct ParticlesAtHand<'a> {
+    args: &'a Particles,
+    /// What they were last told.
+    applied: Physics,
+    /// How many they are.
+    objects: usize,
+}
+
+impl<'a> ParticlesAtHand<'a> {
+    /// They, and the hand that pulls at them.
+    pub(in crate::app) fn begin(args: &'a Particles) -> (Self, Grip) {
+        let applied = Physics::new(args);
+        (Self { args, applied, objects: args.objects }, Grip::new(applied))
+    }
+
+    /// Posts a message to every particle.
+    fn tell_all(&self, manager: &VeManager, message: impl Fn() -> Message) {
+        let mailbox = manager.mailbox();
+        (0..self.objects as u32).for_each(|object| mailbox.post(ObjectId(object), message()));
+    }
+}
+
+impl Scenario for ParticlesAtHand<'_> {
+    type Hand = Grip;
+
+    const GRAIN: Grain = Grain::Spatial;
+
+    fn look(&self, quality: Quality) -> (Look, Camera) {
+        let room = particles::scene_of(self.args, self.objects).room();
+        (Look::room(room, quality), Camera::around(&room))
+    }
+
+    fn build(&mut self, hand: &Grip) -> Result<Scene, RunError> {
+        self.objects = hand.physics.objects;
+        let mut scene = particles::scene_of(self.args, self.objects).build()?;
+        scene.stages.simd = self.args.way.simd();
+        scene.stages.gravity = Vec3::NEG_Y * hand.physics.gravity;
+        // They are as they are built, and are told what is set otherwise.
+        self.applied = Physics { gravity: hand.physics.gravity, ..Physics::new(self.args) };
+        Ok(scene)
+    }
+
+    fn apply(
+        &mut self,
+        hand: &Grip,
+        manager: &mut VeManager,
+        recording: &mut Recording<'_>,
+    ) -> Result<(), RunError> {
+        let (now, before) = (hand.physics, self.applied);
+        self.applied = now;
+        if now.gravity != before.gravity {
+            recording.control(manager, Control::Gravity(Vec3::NEG_Y * now.gravity))?;
+        }
+        if now.stiffness != before.stiffness {
+            let (between_nodes, to_center) = (now.stiffness, now.stiffness * CENTER_STIFFNESS);
+            self.tell_all(manager, || Message::Stiffness { between_nodes, to_center });
+        }
+        if now.damping != before.damping {
+            self.tell_all(manager, || Message::Damping(now.damping));
+        }
+        Ok(())
+    }
+
+    fn advance(
+        &mut self,
+        view: &mut View<Grip>,
+        mut manager: VeManager,
+        recording: &mut Recording<'_>,
+        frames: u64,
+        (on_frame, _): (&mut dyn FnMut(&FrameRecord), Manage<'_>),
+    ) -> Result<VeManager, RunError> {
+        recording.run(&mut manager, frames, view, on_frame)?;
+        Ok(manager)
+    }
+}

@@ -1,0 +1,128 @@
+//! What a ray meets: a person's look at a pixel, say.
+
+use glam::Vec3;
+use parry3d::query::{Ray, RayCast};
+use parry3d::shape::Triangle;
+
+use super::{Bounds, Geometry, Mesh, Volume};
+
+impl Geometry {
+    /// How far a ray goes until it meets the surface, in metres; `None` if it does not within `reach`
+    /// metres. Both sides of a deformable surface are met; a ray that begins inside of a rigid shape
+    /// or of bone meets it at once. `direction` is of unit length.
+    #[must_use]
+    pub fn cast(&self, origin: Vec3, direction: Vec3, reach: f32) -> Option<f32> {
+        let within = crossed(&self.bounds(), origin, direction, reach)?;
+        match self {
+            Self::Mesh(mesh) => cast_mesh(mesh, &Ray::new(origin, direction), reach),
+            Self::Rigid(rigid) => {
+                rigid.shape.cast_ray(&rigid.pose, &Ray::new(origin, direction), reach, true)
+            }
+            Self::Volume(volume) => {
+                let [begin, end] = within;
+                let way = volume.cast(origin + direction * begin, direction, end - begin)?;
+                Some(begin + way)
+            }
+        }
+    }
+}
+
+impl Volume {
+    /// How far a ray goes until it is in bone, in metres; `None` if it is not within `reach` metres.
+    /// `direction` is of unit length. Bone thinner than the distance between voxels may be missed.
+    #[must_use]
+    pub fn cast(&self, origin: Vec3, direction: Vec3, reach: f32) -> Option<f32> {
+        let step = self.spacing().min_element();
+        let steps = (reach / step).ceil() as u32;
+        let mut before = self.density_at(origin);
+        if before >= 0.5 {
+            return Some(0.0);
+        }
+        for way in (1..=steps).map(|number| number as f32 * step) {
+            let density = self.density_at(origin + direction * way);
+            if density >= 0.5 {
+                return Some(way - step * (density - 0.5) / (density - before));
+            }
+            before = density;
+        }
+        None
+    }
+}
+
+fn cast_mesh(mesh: &Mesh, ray: &Ray, reach: f32) -> Option<f32> {
+    let corner = |node: u32| mesh.positions.get(node as usize).unwrap_or(Vec3::NAN);
+    let triangles = mesh.topology().triangles().iter();
+    let hits = triangles.filter_map(|nodes| {
+        let [a, b, c] = nodes.map(corner);
+        Triangle::new(a, b, c).cast_local_ray(ray, reach, false)
+    });
+    hits.min_by(f32::total_cmp)
+}
+
+/// Where a ray enters a box and where it leaves it, in metres along it; `None` if it misses the box or
+/// does not come so far.
+fn crossed(bounds: &Bounds, origin: Vec3, direction: Vec3, reach: f32) -> Option<[f32; 2]> {
+    let inverse = direction.recip();
+    let (to_min, to_max) = ((bounds.min - origin) * inverse, (bounds.max - origin) * inverse);
+    let begin = to_min.min(to_max).max_element().max(0.0);
+    let end = to_min.max(to_max).min_element().min(reach);
+    (begin <= end).then_some([begin, end])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use parry3d::math::Pose;
+    use parry3d::shape::SharedShape;
+
+    use super::*;
+    use crate::geometry::{Rigid, Topology, icosphere};
+
+    const RADIUS: f32 = 0.02;
+    const CENTER: Vec3 = Vec3::new(0.1, 0.2, 0.3);
+
+    /// The same ball as a surface, a rigid shape and bone.
+    fn balls() -> [Geometry; 3] {
+        let (nodes, triangles) = icosphere(RADIUS);
+        let places: Vec<Vec3> = nodes.iter().map(|&node| CENTER + node).collect();
+        let topology = Topology::new(&places, triangles, &[], false).expect("a sphere");
+        let masses = vec![1.0; places.len()];
+        let mesh = Mesh::new(Arc::new(topology), &places, &masses, 0.001).expect("a sphere");
+        let rigid = Rigid::new(SharedShape::ball(RADIUS), Pose::from_translation(CENTER));
+        let spacing = Vec3::splat(0.001);
+        let corner = CENTER - Vec3::splat(0.025);
+        let inside = |voxel: [u32; 3]| {
+            let place = Vec3::from_array(voxel.map(|index| index as f32 + 0.5)) * 0.001;
+            let depth = RADIUS - (place - Vec3::splat(0.025)).length();
+            (255.0 * (depth / 0.001 + 0.5).clamp(0.0, 1.0)) as u8
+        };
+        let bone = Volume::from_fn([50; 3], spacing, Pose::from_translation(corner), inside);
+        [Geometry::Mesh(mesh), Geometry::Rigid(rigid), Geometry::Volume(bone.expect("small"))]
+    }
+
+    #[test]
+    fn rays_meet_what_they_point_at() {
+        for ball in balls() {
+            for direction in [Vec3::X, Vec3::NEG_Y, Vec3::new(0.6, 0.0, -0.8)] {
+                let origin = CENTER - direction * 0.5;
+                let way = ball.cast(origin, direction, 1.0).expect("it points at the middle");
+                // The surface of few triangles is inside of the ball by a tenth.
+                assert!((0.4799..0.4835).contains(&way), "{way}");
+                assert_eq!(ball.cast(origin, direction, 0.47), None);
+                assert_eq!(ball.cast(origin, -direction, 1.0), None);
+                let aside = direction.any_orthonormal_vector() * 0.021;
+                assert_eq!(ball.cast(origin + aside, direction, 1.0), None);
+            }
+        }
+    }
+
+    #[test]
+    fn solids_are_met_from_inside_at_once() {
+        let [surface, rigid, bone] = balls();
+        let far = surface.cast(CENTER, Vec3::X, 1.0).expect("it is around the place");
+        assert!((0.016..=RADIUS).contains(&far), "{far}");
+        assert_eq!(rigid.cast(CENTER, Vec3::X, 1.0), Some(0.0));
+        assert_eq!(bone.cast(CENTER, Vec3::X, 1.0), Some(0.0));
+    }
+}

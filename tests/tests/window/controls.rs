@@ -1,0 +1,77 @@
+//! What the overlay can change of how frames are run.
+
+use serde_json::Value;
+
+use super::desktop::{Desktop, Session};
+use super::untouched;
+
+/// One particle, and room for all of the overlay.
+const ONE: [&str; 6] = ["--objects", "1", "--threads", "2", "--size", "640x640"];
+/// The height of the overlay's rows, in pixels.
+const ROW: i16 = 23;
+/// Where the overlay's second column begins, and a little more.
+const COLUMN: i16 = 124;
+
+/// The program with the overlay standing still, and how high the slider of workers is.
+fn paused(desktop: &Desktop) -> (Session<'_>, i16) {
+    let mut session = desktop.open(&ONE);
+    session.strike(' ');
+    let paused = session.wait_until_still();
+    let (_, workers) = *paused.sliders().last().expect("the overlay is shown");
+    (session, workers)
+}
+
+/// Lets a few frames pass, closes the window, and makes sure that the state is that of so many frames run
+/// in the usual way.
+fn end(mut session: Session<'_>) -> Value {
+    session.strike('n');
+    session.wait_until_still();
+    let report = session.close();
+    assert_eq!(report["state_hash"], untouched(&ONE, &report["frames"]));
+    report
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn workers_join_and_leave() {
+    let desktop = Desktop::start();
+    let (mut session, workers) = paused(&desktop);
+    // The left end of the slider.
+    session.click(COLUMN - 5, workers);
+    assert_eq!(end(session)["threads"], 1);
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn one_frame_in_flight() {
+    let desktop = Desktop::start();
+    let (mut session, workers) = paused(&desktop);
+    session.click(COLUMN, workers + ROW);
+    assert_eq!(end(session)["frames_in_flight"], 1);
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn another_executor() {
+    let desktop = Desktop::start();
+    let (mut session, workers) = paused(&desktop);
+    let list = workers - ROW;
+    session.click(COLUMN, list);
+    // The list covers what is below.
+    session.click(COLUMN, list + 2 * ROW);
+    assert_ne!(end(session)["executor"], "pipeline");
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn a_new_start() {
+    let desktop = Desktop::start();
+    let (mut session, workers) = paused(&desktop);
+    // Beside the number of particles; a separator is between.
+    session.click(COLUMN + 30, workers - 2 * ROW - 9);
+    session.strike('n');
+    session.wait_until_still();
+    let report = session.close();
+    assert!(report["frames"].as_u64() > Some(1), "frames before it count: {}", report["frames"]);
+    assert_eq!(report["state_hash"], untouched(&ONE, &Value::from(1)));
+}
