@@ -29,8 +29,8 @@ pub struct Coupling {
 }
 
 impl Coupling {
-    /// The force on a hand that is so far ahead of the tool (metres), in newtons; the opposite is on the
-    /// tool.
+    /// The force of a hand of this strength that is so far ahead of the tool (metres), in newtons: what is felt
+    /// of the tool, and the opposite of what pushes it.
     #[must_use]
     pub fn force(&self, ahead: Vec3) -> Vec3 {
         let out = ahead.dot(self.normal);

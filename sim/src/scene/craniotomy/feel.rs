@@ -202,7 +202,10 @@ impl<'c> Feel<'c> {
             };
             normal * step.clamp(-SHIFT, SHIFT)
         });
-        spring(coupling.force(place + shift - tip), stiffness, Some(normal), device)
+        let ahead = place + shift - tip;
+        // A hand may push with more than the drill is pushed on with; what a device can do holds it back.
+        let pull = (ahead - normal * ahead.dot(normal).max(0.0)) * -stiffness;
+        spring(pull, stiffness, Some(normal), device)
     }
 
     /// Of the bone that is nearest, or touched deepest, with its normal if it is touched.
