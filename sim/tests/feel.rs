@@ -18,7 +18,7 @@ use dualframe_sim::record::wire::{Decoder, Encoder, Malformed};
 use dualframe_sim::record::{Header, Recorder, Replay, SceneSpec, Step};
 use dualframe_sim::render::NullRenderer;
 use dualframe_sim::scene::Scene;
-use dualframe_sim::scene::craniotomy::{Operation, TIME_STEP, TOOLS, build};
+use dualframe_sim::scene::craniotomy::{Operation, SKULL, TIME_STEP, TOOLS, build};
 use dualframe_sim::scene::head::{Entry, Head};
 use glam::{Quat, Vec3};
 
@@ -320,6 +320,60 @@ fn held_scalp_pulls() {
     assert!(near > 0.05 && far > 1.5 * near, "{near} N at 5 mm, {far} N at 10 mm");
     let after = seen.during(2.5, 3.0).map(|tick| tick.force.length()).fold(0.0, f32::max);
     assert!(after == 0.0, "{after} N after it has let go");
+}
+
+/// A scalpel that is led along the planned incision is held back, against its way, by the force that it takes
+/// to cut; in the air nothing holds it.
+#[test]
+fn scalp_resists_the_scalpel() {
+    let plan = &head().plan;
+    let at = |(number, (&point, &normal)): (usize, (&Vec3, &Vec3))| {
+        let orientation = Quat::from_rotation_arc(Vec3::Z, normal);
+        let sample = DeviceSample { position: point - normal * 0.004, orientation, buttons: 1 };
+        Keyframe { time: 0.6 + 0.1 * number as f64, sample }
+    };
+    let mut keyframes: Vec<Keyframe> =
+        plan.incision.iter().zip(&plan.incision_normals).enumerate().map(at).collect();
+    let mut first = Keyframe { time: 0.1, ..keyframes[0] };
+    first.sample.position += plan.incision_normals[0] * 0.03;
+    first.sample.buttons = 0;
+    keyframes.insert(0, first);
+    let session = Session::new(Instrument::Scalpel, Hand::FIRM, &keyframes, 2.5);
+    let seen = session.alone();
+    assert!(seen.force(0.0, 0.5) == Vec3::ZERO);
+    for time in (10..24).map(|step| 0.1 * f64::from(step)) {
+        let first = seen.during(time, time + 0.1).next().expect("it ticked").place;
+        let last = seen.during(time, time + 0.1).last().expect("it ticked").place;
+        let against = -seen.force(time, time + 0.1).dot((last - first).normalize());
+        assert!((0.9..1.4).contains(&against), "{against} N at {time} s");
+    }
+}
+
+/// Through a hole in the skull an instrument feels the dura, which gives way.
+#[test]
+fn the_dura_is_soft() {
+    let entry = head().plan.burr_hole;
+    let mut scene = scene();
+    let skull = scene.objects[SKULL.0 as usize].geometry.as_volume_mut().expect("bone");
+    for step in 0..=20 {
+        let middle = entry.point + entry.inward * (step as f32 * 0.5e-3);
+        skull.remove(middle, 0.006, |_| 255);
+    }
+    let past = entry.thickness + 0.003;
+    let keyframes = [
+        over(&entry, 0.3, -0.02, false),
+        over(&entry, 1.0, past, false),
+        over(&entry, 2.0, past, false),
+    ];
+    let session = Session::new(Instrument::Elevator, Hand::FIRM, &keyframes, 2.0);
+    let seen = session.run(&mut manager(scene, ExecutorKind::Serial, 1), None);
+    seen.is_sound(true);
+    let strongest = |from: f64, to: f64| {
+        seen.during(from, to).map(|tick| tick.force.length()).fold(0.0, f32::max)
+    };
+    assert!(strongest(0.0, 0.8) == 0.0, "{} N in the hole", strongest(0.0, 0.8));
+    let dura = strongest(0.8, 2.0);
+    assert!((0.01..1.0).contains(&dura), "{dura} N of the dura");
 }
 
 /// Pressing goes on while the pipeline is held up for 200 ms: the force fades to nothing and comes back

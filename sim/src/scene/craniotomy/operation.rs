@@ -12,6 +12,7 @@ use super::steps::{self, Step};
 use super::{SKULL, TIME_STEP, TOOLS, freeing};
 use crate::behavior::Bone;
 use crate::device::link::{SimulationEnd, ToolState};
+use crate::device::motion::Motion;
 use crate::executor::ExecutorError;
 use crate::geometry::Bounds;
 use crate::mailbox::Mailbox;
@@ -73,6 +74,13 @@ impl<'c> Operation<'c> {
     #[must_use]
     pub fn frames(&self) -> u64 {
         self.script.frames()
+    }
+
+    /// What hand number `hand` (0 or 1) does by the script, for a simulated device to follow; none for one that
+    /// does nothing. The clock begins with the first frame.
+    #[must_use]
+    pub fn motion(&self, hand: usize) -> Option<Motion> {
+        self.script.motion(hand)
     }
 
     /// The place of the operation, for who looks at it.

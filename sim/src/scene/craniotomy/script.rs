@@ -4,6 +4,7 @@ use glam::{Quat, Vec3};
 
 use crate::behavior::Instrument;
 use crate::device::DeviceSample;
+use crate::device::motion::{Keyframe, Motion};
 use crate::mailbox::Mailbox;
 use crate::message::Message;
 use crate::object::ObjectId;
@@ -75,6 +76,16 @@ impl Script {
         for hand in 0..2 {
             self.wait(hand, longest - self.hands[hand].len());
         }
+    }
+
+    /// What a hand does, frame by frame, on a haptic loop's clock that begins with the first frame; none for
+    /// a hand that does nothing.
+    pub(super) fn motion(&self, hand: usize) -> Option<Motion> {
+        let keyframe = |(frame, cue): (usize, &Cue)| Keyframe {
+            time: frame as f64 * f64::from(self.time_step),
+            sample: cue.sample,
+        };
+        Motion::new(self.hands.get(hand)?.iter().enumerate().map(keyframe)).ok()
     }
 
     /// Posts what the hands do in the frame two after `swapped`. A tool switch is told when it happens. Of a
