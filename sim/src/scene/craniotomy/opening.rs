@@ -93,8 +93,9 @@ fn push_cut(skull: &Volume, (from, to): (&Entry, &Entry), reach: f32, voxels: &m
         let middle = (Vec3::new(x as f32, y as f32, z as f32) + 0.5) * skull.spacing();
         let way = middle - start;
         let aside = across(way);
+        let share = aside.dot(per_length);
         // What is not a number gives way to 0.
-        let share = aside.dot(per_length).max(0.0).min(1.0);
+        let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
         let near = aside.distance_squared(length * share) <= reach * reach;
         if near && depths.contains(&way.dot(inward)) {
             voxels.push([x, y, z].map(|index| index as i32));
