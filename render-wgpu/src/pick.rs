@@ -3,8 +3,9 @@
 use std::sync::mpsc::Sender;
 
 use bytemuck::{Pod, Zeroable};
-use dualframe_sim::object::ObjectId;
-use glam::{Mat4, Quat, Vec2, Vec3};
+use dualframe_sim::geometry::Mesh;
+use dualframe_sim::object::{Object, ObjectId};
+use glam::{Mat4, Vec2, Vec3};
 use wgpu::{
     BindGroup, Buffer, BufferDescriptor, BufferUsages, ColorTargetState, CommandEncoder, Device,
     Extent3d, FragmentState, LoadOp, MultisampleState, Operations, PipelineLayoutDescriptor,
@@ -38,7 +39,8 @@ pub struct Picked {
 pub struct Pick {
     /// The pixel's middle, from (−1, −1) at the lower left of the picture to (1, 1).
     pub point: Vec2,
-    /// Where the answer goes: `None` if there is no object. Without an answer the device failed.
+    /// Where the answer goes: `None` if there is no object. Without an answer the device failed, or the
+    /// object has gone meanwhile.
     pub answer: Sender<Option<Picked>>,
 }
 
@@ -54,9 +56,44 @@ impl GpuUnit for Pick {
     fn finish(self: Box<Self>, context: &Context<'_>, results: Result<&[u8], GraphicsError>) {
         let hit = results.ok().and_then(|bytes| bytes.get(..size_of::<Hit>()));
         let Some(hit) = hit.map(bytemuck::pod_read_unaligned::<Hit>) else { return };
-        // Whoever asked may have gone.
-        let _ = self.answer.send(hit.resolve(context, self.point));
+        match hit.resolve(context, self.point) {
+            Some((object, place)) => {
+                let found = Found { object, place, answer: self.answer };
+                context.found.borrow_mut().push(found);
+            }
+            // Whoever asked may have gone.
+            None => drop(self.answer.send(None)),
+        }
     }
+}
+
+/// An object that was under a pixel. Its node is found when the object comes to be drawn again: the device
+/// alone has the positions of the frame that it was in.
+pub(crate) struct Found {
+    object: ObjectId,
+    place: Vec3,
+    answer: Sender<Option<Picked>>,
+}
+
+impl Found {
+    /// Answers, if it is this object.
+    pub(crate) fn meet(&self, other: &Object) -> bool {
+        let Self { object, place, .. } = *self;
+        let is_it = object == other.id();
+        if is_it {
+            let node = other.geometry.as_mesh().map_or(0, |mesh| nearest(mesh, place));
+            // Whoever asked may have gone.
+            let _ = self.answer.send(Some(Picked { object, node, place }));
+        }
+        is_it
+    }
+}
+
+/// The node nearest to a place.
+fn nearest(mesh: &Mesh, place: Vec3) -> u32 {
+    let distances = mesh.positions.iter().map(|node| node.distance_squared(place));
+    let nearest = distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+    nearest.map_or(0, |(node, _)| node as u32)
 }
 
 /// What the device finds under a pixel.
@@ -68,18 +105,11 @@ struct Hit {
 }
 
 impl Hit {
-    fn resolve(self, context: &Context<'_>, point: Vec2) -> Option<Picked> {
+    fn resolve(self, context: &Context<'_>, point: Vec2) -> Option<(ObjectId, Vec3)> {
         let object = self.object_plus_one.checked_sub(1)?;
         let clip = point.extend(f32::from_bits(self.depth));
         let place = context.view.view_projection.inverse().project_point3(clip);
-        let node = context.surfaces.find(object).map_or(0, |(body, [x, y, z])| {
-            let turned = Quat::from_array(body.rotation);
-            let own = turned.inverse() * (place - Vec3::from_array(body.place));
-            let distance = |node: usize| Vec3::new(x[node], y[node], z[node]).distance_squared(own);
-            let nearest = (0..x.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-            nearest.unwrap_or(0) as u32
-        });
-        Some(Picked { object: ObjectId(object), node, place })
+        Some((ObjectId(object), place))
     }
 }
 

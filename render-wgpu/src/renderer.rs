@@ -1,5 +1,7 @@
 //! The renderer: what the token's holder draws with.
 
+use std::cell::RefCell;
+
 use dualframe_sim::geometry::Geometry;
 use dualframe_sim::object::Object;
 use dualframe_sim::render::Renderer;
@@ -14,7 +16,7 @@ use crate::error::GraphicsError;
 use crate::globals::{Globals, View};
 use crate::gpu::Gpu;
 use crate::look::Look;
-use crate::pick::Picker;
+use crate::pick::{Found, Picker};
 use crate::picture::{Picture, read_texture};
 use crate::room::Room;
 use crate::springs::{GpuMassSpring, Integrator};
@@ -43,6 +45,8 @@ pub struct Painter {
     picker: Picker,
     integrator: Integrator,
     units: Units,
+    /// What was picked and waits for its node.
+    found: RefCell<Vec<Found>>,
     format: Format,
     target: Target,
     /// The frame being drawn, from its first object on.
@@ -74,6 +78,7 @@ impl Painter {
             picker: Picker::new(device, &layouts),
             integrator: Integrator::default(),
             units: Units::new(),
+            found: RefCell::default(),
             target: Target::new(device, format, size.0, size.1),
             camera: Camera::around(&look.focus),
             layouts,
@@ -131,9 +136,9 @@ impl Painter {
     /// a [`GpuMassSpring`] are integrated in any case.
     pub fn add(&mut self, object: &Object) {
         let size = self.size();
-        let Self { gpu, layouts, surfaces, volumes, picker, integrator, units, .. } = self;
+        let Self { gpu, layouts, surfaces, volumes, picker, integrator, units, found, .. } = self;
         let view = self.view.get_or_insert_with(|| {
-            surfaces.clear();
+            surfaces.clear(&gpu.queue);
             volumes.clear();
             View::new(self.camera, self.look, self.target.aspect())
         });
@@ -143,9 +148,10 @@ impl Painter {
         if let Some(springs) = GpuMassSpring::of(object)
             && gpu.failure().is_none()
         {
-            let context = Context { gpu, view, size, surfaces, picker, integrator };
+            let context = Context { gpu, view, size, surfaces, picker, integrator, found };
             springs.integrate(&context, units);
         }
+        found.get_mut().retain(|found| !found.meet(object));
         if !view.may_see(&object.bounds()) {
             return;
         }
@@ -170,7 +176,7 @@ impl Painter {
     /// what was taken. Does nothing once the device has failed.
     pub fn paint(&mut self, encoder: &mut CommandEncoder, picture: &TextureView) {
         let view = self.view.take().unwrap_or_else(|| {
-            self.surfaces.clear();
+            self.surfaces.clear(&self.gpu.queue);
             self.volumes.clear();
             View::new(self.camera, self.look, self.target.aspect())
         });
@@ -179,7 +185,8 @@ impl Painter {
         }
         let Gpu { device, queue, .. } = &self.gpu;
         let numbers = view.numbers();
-        match self.surfaces.upload((device, queue), &self.layouts, numbers.as_words()) {
+        let words = numbers.as_words();
+        match self.surfaces.upload((device, queue), encoder, &self.layouts, words) {
             Ok(false) => {}
             Ok(true) => self.globals.rebind(device, &self.layouts, self.surfaces.buffer()),
             Err(error) => {
@@ -208,8 +215,10 @@ impl Painter {
         self.volumes.paint(&mut pass, &self.globals.lit);
         drop(pass);
         let size = self.size();
-        let Self { gpu, surfaces, picker, integrator, units, .. } = self;
-        let context = Context { gpu, view: &view, size, surfaces, picker, integrator };
+        let Self { gpu, surfaces, picker, integrator, units, found, .. } = self;
+        // An object that was not drawn again has gone.
+        found.get_mut().clear();
+        let context = Context { gpu, view: &view, size, surfaces, picker, integrator, found };
         units.finish(&context);
         units.run_now(&context);
         units.encode(&context, encoder);

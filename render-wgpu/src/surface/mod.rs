@@ -1,7 +1,7 @@
 //! Surfaces of deformable bodies and rigid shapes.
 //!
 //! A deformable body's state is all that is sent: its nodes' positions as they are in memory, in one
-//! copy. Vertices fetch them by number and make their normals from their neighbours, so that updates
+//! copy to where the device takes it from. Vertices fetch them by number and make their normals from their neighbours, so that updates
 //! have nothing to write for the renderer.
 
 mod frame_buffer;
@@ -15,7 +15,9 @@ use std::sync::Arc;
 use dualframe_sim::geometry::{Mesh, Rigid, Vectors};
 use dualframe_sim::object::{Drawing, Object};
 use parry3d::shape::SharedShape;
-use wgpu::{BindGroup, Buffer, BufferSlice, Device, Queue, RenderPass, RenderPipeline};
+use wgpu::{
+    BindGroup, Buffer, BufferSlice, CommandEncoder, Device, Queue, RenderPass, RenderPipeline,
+};
 
 use self::frame_buffer::FrameBuffer;
 pub(crate) use self::frame_buffer::GLOBALS;
@@ -60,9 +62,9 @@ impl Surfaces {
     }
 
     /// Forgets the last frame's bodies.
-    pub(crate) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self, queue: &Queue) {
         self.frame += 1;
-        self.sent.clear();
+        self.sent.begin(queue);
         for make in &mut self.makes {
             make.surfaces.clear();
             make.wires.clear();
@@ -94,7 +96,7 @@ impl Surfaces {
         let address = Arc::as_ptr(topology).addr();
         let make = self.make(address, || Some(Make::deformable(device, layouts, topology)));
         let Some(make) = make else { return };
-        let first = self.sent.words.len() as u32;
+        let first = self.sent.len() as u32;
         self.stage(&mesh.positions);
         if coloring == Coloring::Speed {
             self.stage(&mesh.velocities);
@@ -135,7 +137,7 @@ impl Surfaces {
 
     fn stage(&mut self, vectors: &Vectors) {
         for component in vectors.as_slices() {
-            self.sent.words.extend_from_slice(component);
+            self.sent.extend(component);
         }
     }
 
@@ -163,17 +165,18 @@ impl Surfaces {
     /// More than the device's buffers hold.
     pub(crate) fn upload(
         &mut self,
-        (device, queue): (&Device, &Queue),
+        devices: (&Device, &Queue),
+        encoder: &mut CommandEncoder,
         layouts: &Layouts,
         numbers: &[f32],
     ) -> Result<bool, GraphicsError> {
-        self.instances = size_of_val(self.sent.words.as_slice());
+        self.instances = size_of::<f32>() * self.sent.len();
         for make in &self.makes {
             for list in [&make.surfaces, &make.wires] {
-                self.sent.words.extend_from_slice(bytemuck::cast_slice(list));
+                self.sent.extend(bytemuck::cast_slice(list));
             }
         }
-        self.sent.upload((device, queue), layouts, numbers)
+        self.sent.upload(devices, encoder, layouts, numbers)
     }
 
     /// The buffer that begins with the frame's numbers.
@@ -216,17 +219,6 @@ impl Surfaces {
                 batch.draw(pass);
             }
         });
-    }
-
-    /// This frame's body of an object, and its nodes' positions as x, y and z.
-    pub(crate) fn find(&self, object: u32) -> Option<(&Instance, [&[f32]; 3])> {
-        let bodies = self.makes.iter().flat_map(|make| &make.surfaces);
-        let body = bodies.into_iter().find(|body| body.object == object)?;
-        let (first, nodes) = (body.first as usize, body.nodes as usize);
-        let all = self.sent.words.get(first..first + 3 * nodes)?;
-        let (x, rest) = all.split_at(nodes);
-        let (y, z) = rest.split_at(nodes);
-        Some((body, [x, y, z]))
     }
 
     /// The number of bodies in this frame.

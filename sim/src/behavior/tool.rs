@@ -8,14 +8,13 @@ use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
 use super::drill::{Bit, Burr, Coupling, Erode, Feed, Perforator, Reaction};
+use super::instrument::EDGE;
 use super::{Behavior, Felt, Grasp, Hold, Input, Instrument, LetGo, tissue};
 use crate::device::DeviceSample;
 use crate::geometry::{Blade, Geometry, Rigid};
 use crate::message::{Custom, Message};
 use crate::object::{Object, ObjectId};
 
-/// The length of a scalpel's edge, from the tip on, in metres; usually 0.02.
-const EDGE: f32 = 0.02;
 /// How far from an elevator's tip it scrapes, in metres; usually 0.006.
 const SCRAPED: f32 = 0.006;
 /// How far from the tip forceps and hooks take hold, in metres; usually 0.008.
@@ -42,10 +41,6 @@ const BONE_STEP: f32 = 2.5e-4;
 /// How far a drill goes outside bone in a frame at most, in metres; usually 1.2 mm, the least radius of a
 /// bit, so that none is beyond the bone before it is felt.
 const FREE_STEP: f32 = 1.2e-3;
-/// The radius of the tips of instruments that touch tissue, in metres; usually 0.002.
-const BLUNT: f32 = 0.002;
-/// The length of a handle, for the eye, in metres; usually 0.12.
-const HANDLE: f32 = 0.12;
 
 /// What a tool can work on.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -118,7 +113,7 @@ impl Tool {
         device: DeviceSample,
         workpieces: Workpieces,
     ) -> (Rigid, Self) {
-        let shapes = Instrument::ALL.map(shape);
+        let shapes = Instrument::ALL.map(Instrument::shape);
         let pose = Pose::from_parts(device.position, device.orientation);
         let rigid = Rigid::new(shapes[instrument as usize].clone(), pose);
         let hands = [(PUSH, Feed::RESISTANCE), (Perforator::PUSH, LEANING_RESISTANCE)];
@@ -199,7 +194,7 @@ impl Tool {
     }
 
     fn bit(&self) -> Option<Bit> {
-        bit(self.instrument)
+        self.instrument.bit()
     }
 
     /// Where the tip goes in this frame.
@@ -372,45 +367,9 @@ impl Behavior for Tool {
     }
 }
 
-/// The bit of an instrument that drills.
-fn bit(instrument: Instrument) -> Option<Bit> {
-    match instrument {
-        Instrument::Perforator => Some(Bit::PERFORATOR),
-        Instrument::Burr => Some(Bit::BURR),
-        Instrument::Craniotome => Some(Bit::CRANIOTOME),
-        _ => None,
-    }
-}
-
 /// The direction of the handle.
 fn axis(orientation: Quat) -> Vec3 {
     // The quaternion type's own product differs between vector units.
     let [x, y, z, w] = orientation.to_array();
     Vec3::new(2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y))
-}
-
-/// What an instrument looks like, and touches tissue with.
-fn shape(instrument: Instrument) -> SharedShape {
-    let ball = |radius: f32| (Pose::from_translation(Vec3::Z * radius), SharedShape::ball(radius));
-    let rod = |from: f32, to: f32, radius: f32| {
-        let rod = SharedShape::capsule(Vec3::Z * (from + radius), Vec3::Z * (to - radius), radius);
-        (Pose::IDENTITY, rod)
-    };
-    let parts = match instrument {
-        Instrument::Scalpel => vec![
-            (
-                Pose::from_translation(Vec3::Z * (0.5 * EDGE)),
-                SharedShape::cuboid(3e-4, 2e-3, 0.5 * EDGE),
-            ),
-            rod(EDGE, HANDLE, 3e-3),
-        ],
-        Instrument::Elevator => vec![ball(BLUNT), rod(0.0, HANDLE, 1.5e-3)],
-        Instrument::Forceps | Instrument::Hook => vec![ball(1.5e-3), rod(0.0, HANDLE, 1.2e-3)],
-        Instrument::Perforator | Instrument::Burr | Instrument::Craniotome => {
-            let bit = bit(instrument).unwrap_or(Bit::BURR);
-            let end = bit.length + 2.0 * bit.radius;
-            vec![ball(bit.radius), rod(0.0, end, bit.radius), rod(end, HANDLE, 6e-3)]
-        }
-    };
-    SharedShape::compound(parts)
 }

@@ -147,28 +147,67 @@ fn the_same_bits_on_every_machine() {
     );
 }
 
+/// The same image whose file has its axes in another order, one of them the other way round.
+fn reordered(image: &Image) -> Image {
+    let [wide, high, deep] = image.grid().dims();
+    let affine = image.grid().affine();
+    let [x, y, z] = [0, 1, 2].map(|axis| affine.matrix3.col(axis));
+    let first = affine.translation + y * f64::from(high - 1);
+    let affine = DAffine3::from_mat3_translation(DMat3::from_cols(z, x, -y), first);
+    let grid = Grid::new([deep, wide, high], affine).expect("as many voxels as before");
+    let at = |x: u32, y: u32, z: u32| image.voxels()[((z * high + y) * wide + x) as usize];
+    let rows = (0..high).rev().flat_map(|y| (0..wide).map(move |x| (x, y)));
+    let voxels = rows.flat_map(|(x, y)| (0..deep).map(move |z| at(x, y, z)));
+    Image::new(grid, voxels.collect()).expect("as many voxels as before")
+}
+
 /// A head that lies askew in the scanner, its file's axes in another order, is the same head.
 #[test]
 fn any_axes() {
-    let image = synthetic_ct().expect("its sizes are allowed");
+    let image = reordered(&synthetic_ct().expect("its sizes are allowed"));
     let dims = image.grid().dims();
     let turn = DMat3::from_quat(DQuat::from_axis_angle(DVec3::new(0.2, 0.4, 0.9).normalize(), 0.1));
+    let affine = image.grid().affine();
     let affine = DAffine3::from_mat3_translation(
-        turn * image.grid().affine().matrix3,
-        DVec3::new(0.1, -0.2, 0.3),
+        turn * affine.matrix3,
+        turn * affine.translation + DVec3::new(0.1, -0.2, 0.3),
     );
     let grid = Grid::new(dims, affine).expect("its sizes are allowed");
     let turned = Image::new(grid, image.voxels().to_vec()).expect("as many voxels as before");
     let head = Head::from_ct(turned, &Thresholds::default()).expect("it is a head");
     checks::check(&head);
-    // What was straight ahead is now turned with the head, but for the middle's own move.
-    let [x, y, z] = [0, 1, 2].map(|axis| turn.col(axis).as_vec3());
-    for (patient, before) in [(x, Vec3::Y), (-x, Vec3::NEG_Y), (z, Vec3::Z), (y, Vec3::NEG_X)] {
-        let world = Vec3::new(-patient.y, patient.x, patient.z);
-        let thick = |head: &Head, d: Vec3| head.outer_at(d) - head.inner_at(d);
-        let [now, then] = [thick(&head, world), thick(&HEAD, before)];
-        assert!((now - then).abs() < 0.001, "{now} m instead of {then} m");
+    // What was straight ahead, or halfway to a side, where radii differ most from those beside them, is now
+    // turned with the head, but for the middle's own move.
+    let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z];
+    for before in [x, -x, y, z, x + y, x - y, y - x, -x - y] {
+        let world = |patient: DVec3| DVec3::new(-patient.y, patient.x, patient.z).as_vec3();
+        let (now, then) = (world(turn * before), world(before));
+        for (what, of) in
+            [("inner", Head::inner_at as fn(&Head, Vec3) -> f32), ("outer", Head::outer_at)]
+        {
+            let [now, then] = [of(&head, now), of(&HEAD, then)];
+            assert!((now - then).abs() < 0.001, "{what}: {now} m, not {then} m, along {before}");
+        }
     }
+}
+
+/// What holds the head in the scanner is no part of it.
+#[test]
+fn a_holder_is_left_out() {
+    let image = synthetic_ct().expect("its sizes are allowed");
+    let [wide, high, _] = image.grid().dims().map(|side| side as usize);
+    let mut voxels = image.voxels().to_vec();
+    for (number, voxel) in voxels.iter_mut().enumerate() {
+        let (x, y) = (number % wide, number / wide % high);
+        if (11..14).contains(&x) && (13..16).contains(&y) {
+            assert!(*voxel < -900, "it is in the head");
+            *voxel = 1_500;
+        }
+    }
+    let image = Image::new(image.grid().clone(), voxels).expect("as many voxels as before");
+    let head = Head::from_ct(image, &Thresholds::default()).expect("it is a head");
+    assert_eq!(head.skull.dims(), HEAD.skull.dims());
+    assert_eq!(head.skull.digest(), HEAD.skull.digest());
 }
 
 /// An image of 4 mm voxels, of what `number` says of each voxel's place in millimetres from the middle.

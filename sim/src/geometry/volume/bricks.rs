@@ -3,6 +3,8 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use rayon::prelude::*;
+
 use crate::mix::mix;
 
 /// The side of a brick, in voxels: a brick is a page of 4 KiB, small enough that a drill changes few
@@ -11,6 +13,9 @@ pub const BRICK_SIDE: u32 = 16;
 
 /// The voxels of a brick.
 pub const BRICK_VOXELS: usize = (BRICK_SIDE * BRICK_SIDE * BRICK_SIDE) as usize;
+
+/// The side of a cell, in voxels: what is left out together where there is nothing.
+const CELL_SIDE: u32 = BRICK_SIDE / 2;
 
 /// A brick of a volume, as a renderer sees it.
 #[derive(Clone, Copy, Debug)]
@@ -133,6 +138,38 @@ impl Bricks {
         }
         let header = |densities| Header { revision, peak: peak(densities) };
         let headers = voxels.iter().map(header).collect();
+        Self { layout, voxels, headers, revision, digest }
+    }
+
+    /// As [`Bricks::from_fn`], several bricks at once; what `density` says counts in cells where `may_hold`, given
+    /// their first voxel and their side, says so, and all others are empty.
+    pub(super) fn sparse(
+        layout: Layout,
+        may_hold: impl Fn([u32; 3], u32) -> bool + Sync,
+        density: impl Fn([u32; 3]) -> u8 + Sync,
+    ) -> Self {
+        let bricks: usize = layout.counts().iter().map(|&count| count as usize).product();
+        let revision = new_revision();
+        let mut voxels = vec![[0; BRICK_VOXELS]; bricks];
+        let fill = |(brick, densities): (usize, &mut [u8; BRICK_VOXELS])| {
+            let mut digest = 0_u64;
+            for cell in boxed(layout.place(brick).map(|place| 2 * place..2 * place + 2)) {
+                let first = cell.map(|index| index * CELL_SIDE);
+                if !may_hold(first, CELL_SIDE) {
+                    continue;
+                }
+                let end = |axis: usize| (first[axis] + CELL_SIDE).min(layout.dims[axis]);
+                boxed(std::array::from_fn(|axis| first[axis]..end(axis))).for_each(|voxel| {
+                    let (slot, density) = (slot(voxel), density(voxel));
+                    densities[slot] = density;
+                    digest = digest.wrapping_add(part_of_digest(brick, slot, density));
+                });
+            }
+            (Header { revision, peak: peak(densities) }, digest)
+        };
+        let (headers, digests): (Vec<Header>, Vec<u64>) =
+            voxels.par_iter_mut().enumerate().map(fill).unzip();
+        let digest = digests.into_iter().fold(0, u64::wrapping_add);
         Self { layout, voxels, headers, revision, digest }
     }
 

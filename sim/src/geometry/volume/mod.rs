@@ -125,6 +125,24 @@ impl Volume {
         Ok(Self { bricks, spacing, pose, velocity: Vec3::ZERO, margin: 0.0 })
     }
 
+    /// As [`Volume::from_fn`], faster where most of a volume is empty, and by several threads: `density` is
+    /// asked in cells where `may_hold` says that there may be something. That is given a cell's first voxel and
+    /// the voxels along each of its sides, which may reach beyond the volume.
+    ///
+    /// # Errors
+    /// As [`Volume::new`].
+    pub fn sparse(
+        dims: [u32; 3],
+        spacing: Vec3,
+        pose: Pose,
+        may_hold: impl Fn([u32; 3], u32) -> bool + Sync,
+        density: impl Fn([u32; 3]) -> u8 + Sync,
+    ) -> Result<Self, VolumeError> {
+        check(dims, spacing)?;
+        let bricks = Bricks::sparse(Layout { dims }, may_hold, density);
+        Ok(Self { bricks, spacing, pose, velocity: Vec3::ZERO, margin: 0.0 })
+    }
+
     /// The voxels along x, y and z.
     #[must_use]
     pub fn dims(&self) -> [u32; 3] {

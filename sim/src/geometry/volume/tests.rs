@@ -215,3 +215,27 @@ fn not_finite_is_seen() {
     volume.velocity.x = f32::NAN;
     assert!(!volume.is_finite());
 }
+
+#[test]
+fn a_sparse_volume_is_the_same_as_a_whole_one() {
+    let (dims, spacing) = ([37, 20, 45], Vec3::splat(5e-4));
+    // A ball, and noise in it.
+    let density = |voxel: [u32; 3]| {
+        let [x, y, z] = voxel.map(|index| f64::from(index) - 18.0);
+        let number = u64::from(voxel[0]) << 40 | u64::from(voxel[1]) << 20 | u64::from(voxel[2]);
+        if x * x + y * y + z * z < 120.0 { mix(number) as u8 } else { 0 }
+    };
+    let near = |first: u32, side: u32| first < 18 + 11 && first + side > 18 - 11;
+    let may_hold = |first: [u32; 3], side| first.into_iter().all(|first| near(first, side));
+    let whole = Volume::from_fn(dims, spacing, Pose::IDENTITY, density).expect("it is small");
+    let sparse = Volume::sparse(dims, spacing, Pose::IDENTITY, may_hold, density);
+    let sparse = sparse.expect("it is small");
+    assert!(sparse.densities().eq(whole.densities()));
+    assert_eq!(sparse.digest(), whole.digest());
+    let bricks = |volume: &Volume| -> Vec<([u32; 3], u8)> {
+        volume.changed_since(0).map(|brick| (brick.place, brick.peak)).collect()
+    };
+    assert_eq!(bricks(&sparse), bricks(&whole));
+    let nothing = Volume::sparse([0, 1, 1], spacing, Pose::IDENTITY, may_hold, density);
+    assert!(nothing.is_err());
+}

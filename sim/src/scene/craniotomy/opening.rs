@@ -74,24 +74,26 @@ impl Planned {
 
 /// Adds the voxels of a cut from one entry to another, so far to each side.
 fn push_cut(skull: &Volume, (from, to): (&Entry, &Entry), reach: f32, voxels: &mut Vec<[i32; 3]>) {
-    let inward = (from.inward + to.inward).normalize_or(from.inward);
-    let across = |way: Vec3| way - inward * way.dot(inward);
-    let length = across(to.point - from.point);
     let depths = -BEYOND..=from.thickness.max(to.thickness) + BEYOND;
-    let ends = [from.point, to.point];
     let ends =
-        ends.iter().flat_map(|&end| [depths.start(), depths.end()].map(|&z| end + inward * z));
+        [from, to].map(|end| [*depths.start(), *depths.end()].map(|z| end.point + end.inward * z));
+    let bounds = ends.as_flattened().iter();
     let bounds =
-        ends.fold(Bounds::EMPTY, |bounds, end| bounds.union(&Bounds { min: end, max: end }));
+        bounds.fold(Bounds::EMPTY, |bounds, &end| bounds.union(&Bounds { min: end, max: end }));
     let [xs, ys, zs] = freeing::voxels(skull, &bounds.inflated(reach));
+    // In the skull's own axes.
+    let inward = skull.turned_back((from.inward + to.inward).normalize_or(from.inward));
+    let [start, end] = [from, to].map(|end| skull.to_local(end.point));
+    let across = |way: Vec3| way - inward * way.dot(inward);
+    let length = across(end - start);
+    // Ends may be equal.
+    let per_length = length / length.length_squared().max(f32::MIN_POSITIVE);
     let rows = zs.flat_map(|z| ys.clone().map(move |y| (y, z)));
     for [x, y, z] in rows.flat_map(|(y, z)| xs.clone().map(move |x| [x, y, z])) {
-        let middle = Vec3::new(x as f32, y as f32, z as f32) + 0.5;
-        let way = skull.to_world(middle * skull.spacing()) - from.point;
+        let middle = (Vec3::new(x as f32, y as f32, z as f32) + 0.5) * skull.spacing();
+        let way = middle - start;
         let aside = across(way);
-        // Of two equal ends the share is 0.
-        let share =
-            (aside.dot(length) / length.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let share = aside.dot(per_length).clamp(0.0, 1.0);
         let near = aside.distance_squared(length * share) <= reach * reach;
         if near && depths.contains(&way.dot(inward)) {
             voxels.push([x, y, z].map(|index| index as i32));

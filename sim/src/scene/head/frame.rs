@@ -77,9 +77,8 @@ impl<T: Copy + Into<f32>> Field<'_, T> {
     /// Written out: closures over arrays took three quarters of a head's time in builds of tests.
     pub(super) fn at(&self, point: Vec3) -> f32 {
         let [x, y, z] = self.frame.voxel(point);
-        let (low_x, low_y, low_z) = (x.floor(), y.floor(), z.floor());
-        let (i, j, k) = (low_x as i32, low_y as i32, low_z as i32);
-        let share = [x - low_x, y - low_y, z - low_z];
+        let (i, j, k) = (floor(x), floor(y), floor(z));
+        let share = [x - i as f32, y - j as f32, z - k as f32];
         let near = between(self.row(i, j, k, share[0]), self.row(i, j + 1, k, share[0]), share[1]);
         let k = k + 1;
         let far = between(self.row(i, j, k, share[0]), self.row(i, j + 1, k, share[0]), share[1]);
@@ -89,18 +88,30 @@ impl<T: Copy + Into<f32>> Field<'_, T> {
     /// The number between two voxels of a row.
     #[inline]
     fn row(&self, i: i32, j: i32, k: i32, share: f32) -> f32 {
-        between(self.get(i, j, k), self.get(i + 1, j, k), share)
-    }
-
-    #[inline]
-    fn get(&self, i: i32, j: i32, k: i32) -> f32 {
         let [wide, high, deep] = self.dims;
         // As unsigned numbers, negative ones are too great.
-        if i as u32 >= wide || j as u32 >= high || k as u32 >= deep {
+        if j as u32 >= high || k as u32 >= deep {
             return self.outside.into();
         }
-        self.voxels[(k as usize * high as usize + j as usize) * wide as usize + i as usize].into()
+        let row = (k as usize * high as usize + j as usize) * wide as usize;
+        if (i as u32) < wide - 1 {
+            let ends = &self.voxels[row + i as usize..][..2];
+            return between(ends[0].into(), ends[1].into(), share);
+        }
+        let get = |i: i32| {
+            let inside = (i as u32) < wide;
+            if inside { self.voxels[row + i as usize] } else { self.outside }
+        };
+        between(get(i).into(), get(i.wrapping_add(1)).into(), share)
     }
+}
+
+/// The greatest whole number that is not above: without a call, which it takes where processors need have no
+/// instruction for it.
+#[inline]
+fn floor(value: f32) -> i32 {
+    let whole = value as i32;
+    whole - i32::from(whole as f32 > value)
 }
 
 #[inline]

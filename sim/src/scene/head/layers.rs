@@ -126,21 +126,11 @@ impl Rays<'_> {
     /// are around, and what is less than about 6° wide, a hole or a spike, goes. So they do not follow
     /// holes of more than that, orbits and what is below the skull base.
     pub(super) fn layers(&self) -> Layers {
-        let (mut outer, mut skin) = (Vec::new(), Vec::new());
-        let inner = RadialMap::from_fn(|direction| {
-            let [inner, to, out] = self.cast(direction);
-            outer.push(to);
-            skin.push(out);
-            inner
-        });
-        let map = |radii: Vec<f32>| {
-            let mut radii = radii.into_iter();
-            RadialMap::from_fn(|_| radii.next().unwrap_or(f32::NAN))
-        };
+        let [inner, outer, skin] = RadialMap::several(|direction| self.cast(direction));
         let smooth = |map: RadialMap| map.filled().median(2).mean(1);
         // Thicknesses are smoother than radii: one layer's bump is also the next one's.
-        let bone = map(outer).with(&inner, |outer, inner| outer - inner);
-        let soft = map(skin).with(&inner, |skin, inner| skin - inner).with(&bone, |a, b| a - b);
+        let bone = outer.with(&inner, |outer, inner| outer - inner);
+        let soft = skin.with(&inner, |skin, inner| skin - inner).with(&bone, |a, b| a - b);
         let inner = smooth(inner);
         let outer = smooth(bone).with(&inner, |bone, inner| inner + bone.max(MIN_THICKNESS));
         let skin = smooth(soft).with(&outer, |soft, outer| outer + soft.max(MIN_THICKNESS));

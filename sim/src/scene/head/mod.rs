@@ -104,8 +104,9 @@ impl Head {
         }
         let layers = rays.layers();
         let lattice = Lattice::around(&layers);
-        let skull = Bone::new(lattice, rays.bone).volume()?;
-        let structures = structures::structures(&layers)?;
+        let bone = Bone::new(lattice, rays.bone);
+        let (skull, structures) = rayon::join(|| bone.volume(), || structures::structures(&layers));
+        let (skull, structures) = (skull?, structures?);
         let attachments = attachments::attachments(&structures);
         let plan = Plan::new(&layers, &skull);
         Ok(Self { skull, structures, attachments, plan, image, densities, center, layers, lattice })

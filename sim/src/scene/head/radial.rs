@@ -3,6 +3,7 @@
 use std::cmp::Ordering;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// The cells along an edge of the cube; 64 give steps of 1.8° at most, 2.6 mm on a skull.
 const CELLS: usize = 64;
@@ -17,9 +18,19 @@ const STEP: f32 = 0.03;
 pub(super) struct RadialMap(Vec<f32>);
 
 impl RadialMap {
-    /// The radii that `radius` says of each node's direction, one after the other.
-    pub(super) fn from_fn(radius: impl FnMut(Vec3) -> f32) -> Self {
-        Self(directions().map(radius).collect())
+    /// The radii that `radius` says of each node's direction.
+    pub(super) fn from_fn(radius: impl Fn(Vec3) -> f32 + Send + Sync) -> Self {
+        let [map] = Self::several(|direction| [radius(direction)]);
+        map
+    }
+
+    /// Several maps, whose radii `radii` says of each node's direction.
+    pub(super) fn several<const N: usize>(
+        radii: impl Fn(Vec3) -> [f32; N] + Send + Sync,
+    ) -> [Self; N] {
+        let directions: Vec<Vec3> = directions().collect();
+        let all: Vec<[f32; N]> = directions.into_par_iter().map(radii).collect();
+        std::array::from_fn(|map| Self(all.iter().map(|radii| radii[map]).collect()))
     }
 
     /// The radius along a direction of any length but 0.
@@ -62,10 +73,8 @@ impl RadialMap {
     /// The median of the radii within `reach` steps of each node: holes and bumps smaller than half of
     /// that go, edges stay.
     pub(super) fn median(&self, reach: i32) -> Self {
-        let mut near = Vec::new();
         Self::from_fn(|direction| {
-            near.clear();
-            near.extend(self.around(direction, reach));
+            let mut near: Vec<f32> = self.around(direction, reach).collect();
             let middle = near.len() / 2;
             let order = |a: &f32, b: &f32| a.partial_cmp(b).unwrap_or(Ordering::Equal);
             *near.select_nth_unstable_by(middle, order).1

@@ -69,7 +69,7 @@ pub(super) struct Bone<'a> {
 }
 
 /// The side of a block of an image's voxels, of which it is known whether any holds bone.
-const BLOCK: usize = 4;
+const BLOCK: usize = 2;
 
 impl<'a> Bone<'a> {
     pub(super) fn new(lattice: Lattice, field: Field<'a, u8>) -> Self {
@@ -91,10 +91,11 @@ impl<'a> Bone<'a> {
         (self.field.at(self.lattice.place(voxel)) + 0.5) as u8
     }
 
-    /// Whether a brick may hold bone; `false` only if it holds none.
-    fn may_hold(&self, brick: [u32; 3]) -> bool {
+    /// Whether the voxels from `first` on, so many along each axis, may hold bone; `false` only if they hold
+    /// none.
+    fn may_hold(&self, first: [u32; 3], side: u32) -> bool {
         let corners = (0..8).map(|corner| {
-            let at = [0, 1, 2].map(|axis| (brick[axis] + (corner >> axis & 1)) * BRICK_SIDE);
+            let at = [0, 1, 2].map(|axis| first[axis] + (corner >> axis & 1) * side);
             self.field.frame.voxel(self.lattice.place(at))
         });
         let (low, high) = corners.fold(([f32::MAX; 3], [f32::MIN; 3]), |(low, high), at| {
@@ -117,16 +118,10 @@ impl<'a> Bone<'a> {
     /// The skull, at rest in the world.
     pub(super) fn volume(&self) -> Result<Volume, HeadError> {
         let Lattice { dims, corner } = self.lattice;
-        let mut last = ([u32::MAX; 3], false);
-        let volume =
-            Volume::from_fn(dims, Vec3::splat(SPACING), Pose::from_translation(corner), |voxel| {
-                let brick = voxel.map(|index| index / BRICK_SIDE);
-                if last.0 != brick {
-                    last = (brick, self.may_hold(brick));
-                }
-                if last.1 { self.density(voxel) } else { 0 }
-            })?;
-        Ok(volume)
+        let pose = Pose::from_translation(corner);
+        let may_hold = |first, side| self.may_hold(first, side);
+        let density = |voxel| self.density(voxel);
+        Ok(Volume::sparse(dims, Vec3::splat(SPACING), pose, may_hold, density)?)
     }
 
     /// What is gone of each voxel's density: what is left of it is in `skull`, and in `also` where they
@@ -135,7 +130,7 @@ impl<'a> Bone<'a> {
         let count = self.lattice.dims.iter().map(|&side| side as usize).product();
         let mut gone = vec![0; count];
         for brick in skull.changed_since(0) {
-            if !self.may_hold(brick.place) {
+            if !self.may_hold(brick.first(), BRICK_SIDE) {
                 continue;
             }
             let first = brick.first();

@@ -1,6 +1,7 @@
 //! A head without a patient.
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
+use rayon::prelude::*;
 
 use crate::image::{AIR, Grid, Image, ImageError};
 use crate::mix::mix;
@@ -39,18 +40,14 @@ pub fn synthetic_ct() -> Result<Image, ImageError> {
     let affine =
         DAffine3::from_mat3_translation(DMat3::from_diagonal(DVec3::splat(spacing)), origin);
     let grid = Grid::new(DIMS, affine)?;
-    let [wide, high, deep] = DIMS;
-    let mut voxels = Vec::with_capacity(grid.voxels());
-    for z in 0..deep {
-        for y in 0..high {
-            for x in 0..wide {
-                let noise = (mix(voxels.len() as u64) >> 60) as f32 - 7.5;
-                let index = Vec3::new(x as f32, y as f32, z as f32);
-                let number = hounsfield((index - Vec3::from(MIDDLE)) * VOXEL);
-                voxels.push((number + 0.7 * noise) as i16);
-            }
-        }
-    }
+    let [wide, high, _] = DIMS.map(|side| side as usize);
+    let voxel = |number: usize| {
+        let [x, y, z] = [number % wide, number / wide % high, number / (wide * high)];
+        let noise = (mix(number as u64) >> 60) as f32 - 7.5;
+        let index = Vec3::new(x as f32, y as f32, z as f32);
+        (hounsfield((index - Vec3::from(MIDDLE)) * VOXEL) + 0.7 * noise) as i16
+    };
+    let voxels = (0..grid.voxels()).into_par_iter().map(voxel).collect();
     Image::new(grid, voxels)
 }
 

@@ -6,8 +6,8 @@ const FILL: f32 = 0.1;
 /// Lowers values of a grid until its surface is a manifold.
 ///
 /// A surface net has one corner for each cube that holds positive and negative values. It is pinched
-/// where a cube's negative corners, or its positive ones, are not connected along its edges, or a
-/// face's are not: there, one positive corner after the other, the least first, becomes negative.
+/// where a cube's negative corners, or its positive ones, are not connected along its edges, as they never are
+/// where a face's are not: there, one positive corner after the other, the least first, becomes negative.
 pub(super) fn fill(values: &mut [f32], dims: [usize; 3], spacing: f32) {
     let [wide, high, deep] = dims;
     let ambiguous: Vec<bool> = (0..=255).map(is_ambiguous).collect();
@@ -41,16 +41,7 @@ pub(super) fn fill(values: &mut [f32], dims: [usize; 3], spacing: f32) {
 
 /// Whether a cube whose negative corners are these bits has a pinched surface.
 fn is_ambiguous(negative: u8) -> bool {
-    let face = |axis: usize, side: usize| {
-        let others = [1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3)];
-        let first = side << axis;
-        [first, first + others[0], first + others[0] + others[1], first + others[1]]
-    };
-    let checkered = (0..3).flat_map(|axis| [face(axis, 0), face(axis, 1)]).any(|corners| {
-        let signs = corners.map(|corner| negative >> corner & 1);
-        signs[0] == signs[2] && signs[1] == signs[3] && signs[0] != signs[1]
-    });
-    checkered || !is_connected(negative) || !is_connected(!negative)
+    !is_connected(negative) || !is_connected(!negative)
 }
 
 /// Whether a cube's corners are connected along its edges.

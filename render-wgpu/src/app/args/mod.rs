@@ -1,5 +1,7 @@
 //! The command line.
 
+mod values;
+
 use std::path::PathBuf;
 
 use clap::error::ErrorKind;
@@ -15,10 +17,13 @@ use dualframe_sim::scene::ParticleScene;
 use dualframe_sim::scene::craniotomy::Step;
 use dualframe_sim::simd::{Instructions, Simd};
 
+use self::values::{
+    executor_names, parse_executor, parse_objects, parse_rate, parse_simd, parse_size, parse_step,
+    parse_threads,
+};
+
 /// The most frames of one run: each takes 24 bytes of the report.
 const MAX_FRAMES: u64 = 10_000_000;
-/// The greatest width and height that may be asked for; adapters usually allow 8,192 or 16,384.
-const MAX_PIXELS: u32 = 16_384;
 /// Frames of a run without a window.
 const USUAL_FRAMES: u64 = 800;
 /// The most particles whose every pair can be modelled; the six walls come on top.
@@ -48,7 +53,7 @@ enum Command {
 
 /// Arguments of the experiments.
 #[derive(Args)]
-pub(super) struct ExperimentArgs {
+pub(in crate::app) struct ExperimentArgs {
     /// Which experiment.
     #[arg(value_enum)]
     which: ExperimentName,
@@ -60,7 +65,7 @@ pub(super) struct ExperimentArgs {
     scene: Option<SceneName>,
     /// The folder to write into, which is made if it is not there.
     #[arg(long, value_name = "DIR")]
-    pub(super) out: PathBuf,
+    pub(in crate::app) out: PathBuf,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -86,7 +91,7 @@ enum SceneName {
 }
 
 impl ExperimentArgs {
-    pub(super) fn experiments(&self) -> Vec<Experiment> {
+    pub(in crate::app) fn experiments(&self) -> Vec<Experiment> {
         match self.which {
             ExperimentName::Scalability => vec![Experiment::Scalability],
             ExperimentName::LoadBalance => vec![Experiment::LoadBalance],
@@ -99,7 +104,7 @@ impl ExperimentArgs {
         }
     }
 
-    pub(super) fn plan(&self) -> Plan {
+    pub(in crate::app) fn plan(&self) -> Plan {
         if self.quick { Plan::quick() } else { Plan::full() }
     }
 
@@ -114,22 +119,22 @@ impl ExperimentArgs {
 
 /// How frames are run, which changes no result.
 #[derive(Args)]
-pub(super) struct Way {
+pub(in crate::app) struct Way {
     #[arg(long, value_name = "N", default_value_t = cores().min(MAX_THREADS),
           value_parser = parse_threads,
           help = format!("Number of threads, 1 to {MAX_THREADS}; all cores if not given"))]
-    pub(super) threads: usize,
+    pub(in crate::app) threads: usize,
     #[arg(long, value_name = "NAME", default_value = ExecutorKind::Pipeline.name(),
           value_parser = parse_executor,
           help = format!("What drives the stages: {}", executor_names()))]
-    pub(super) executor: ExecutorKind,
+    pub(in crate::app) executor: ExecutorKind,
     /// Blocks of close objects, or every modelled pair; the scene's own if not given.
     #[arg(long, value_name = "KIND", value_enum)]
     broad_phase: Option<BroadPhaseName>,
     /// Frames that the pipeline works on at once, 1 or 2.
     #[arg(long, value_name = "N", default_value_t = 2,
           value_parser = clap::value_parser!(u8).range(1..=2))]
-    pub(super) frames_in_flight: u8,
+    pub(in crate::app) frames_in_flight: u8,
     #[arg(long, value_name = "NAME", value_parser = parse_simd,
           help = format!("Vector instructions of the kernels, {}; the widest that the machine has \
                           if not given", Instructions::ALL.map(Instructions::name).join(" or ")))]
@@ -149,12 +154,12 @@ impl Way {
         if self.frames_in_flight == 1 { Entry::AfterSwap } else { Entry::AfterUpdate }
     }
 
-    pub(super) fn simd(&self) -> Simd {
+    pub(in crate::app) fn simd(&self) -> Simd {
         self.simd.unwrap_or_else(Simd::detect)
     }
 
     /// `usual` is the scene's own broad phase.
-    pub(super) fn settings(&self, usual: Grain) -> Settings {
+    pub(in crate::app) fn settings(&self, usual: Grain) -> Settings {
         let Self { executor, threads, .. } = *self;
         let (grain, entry) = (self.grain(usual), self.entry());
         Settings { executor, threads, pinned: false, grain, entry }
@@ -167,79 +172,79 @@ impl Way {
     after_help = "Status 0: every checkpoint agreed. Status 1: one did not, or the file is damaged \
                         and what is whole of it was played. Status 2: nothing of it can be played."
 )]
-pub(super) struct ReplayArgs {
+pub(in crate::app) struct ReplayArgs {
     /// The recording.
     #[arg(value_name = "FILE")]
-    pub(super) file: PathBuf,
+    pub(in crate::app) file: PathBuf,
     #[command(flatten)]
-    pub(super) way: Way,
+    pub(in crate::app) way: Way,
     /// Write what came of it as JSON.
     #[arg(long, value_name = "FILE")]
-    pub(super) json: Option<PathBuf>,
+    pub(in crate::app) json: Option<PathBuf>,
 }
 
 /// Arguments of the particle environment.
 #[derive(Args)]
 #[command(after_help = format!("With --broad-phase pairwise there can be {MAX_PAIRWISE} particles at most."))]
-pub(super) struct Particles {
+pub(in crate::app) struct Particles {
     /// Number of particles.
     #[arg(long, value_name = "N", default_value_t = 300, value_parser = parse_objects,
           help = format!("Number of particles, 1 to {}", ParticleScene::MAX_OBJECTS))]
-    pub(super) objects: usize,
+    pub(in crate::app) objects: usize,
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_FRAMES),
           help = format!("Number of frames, 1 to {MAX_FRAMES}; if not given, {USUAL_FRAMES}, or in a \
                           window until it is closed"))]
-    pub(super) frames: Option<u64>,
+    pub(in crate::app) frames: Option<u64>,
     /// What velocities and substeps are drawn from.
     #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(super) seed: u64,
+    pub(in crate::app) seed: u64,
     /// Let the particles fall.
     #[arg(long)]
-    pub(super) gravity: bool,
+    pub(in crate::app) gravity: bool,
     #[command(flatten)]
-    pub(super) way: Way,
+    pub(in crate::app) way: Way,
     #[command(flatten)]
-    pub(super) products: Products,
+    pub(in crate::app) products: Products,
 }
 
 /// What a run draws and writes.
 #[derive(Args)]
-pub(super) struct Products {
+pub(in crate::app) struct Products {
     /// Show a window, which is what happens where there is a display
     #[arg(long, conflicts_with_all = ["headless", "offscreen", "frames_out"])]
-    pub(super) window: bool,
+    pub(in crate::app) window: bool,
     /// Run without a window
     #[arg(long, conflicts_with = "offscreen")]
     headless: bool,
     /// Draw every frame without a window
     #[arg(long)]
-    pub(super) offscreen: bool,
+    pub(in crate::app) offscreen: bool,
     /// Write a picture of the last frame
     #[arg(long, value_name = "FILE.png")]
-    pub(super) picture: Option<PathBuf>,
+    pub(in crate::app) picture: Option<PathBuf>,
     /// Write a picture of every frame into a folder, which is made if it is not there
     #[arg(long, value_name = "DIR", conflicts_with = "headless")]
-    pub(super) frames_out: Option<PathBuf>,
+    pub(in crate::app) frames_out: Option<PathBuf>,
     /// Width and height of window and pictures, in pixels
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
-    pub(super) size: (u32, u32),
+    pub(in crate::app) size: (u32, u32),
     /// A part of the graphics adapter's name
     #[arg(long, value_name = "NAME")]
-    pub(super) adapter: Option<String>,
+    pub(in crate::app) adapter: Option<String>,
     /// Write what each worker did in the last seconds, for chrome://tracing or ui.perfetto.dev
     #[arg(long, value_name = "FILE")]
-    pub(super) trace: Option<PathBuf>,
+    pub(in crate::app) trace: Option<PathBuf>,
     /// Record the session, for `dualframe replay`; starting anew in a window ends the recording
     #[arg(long, value_name = "FILE")]
-    pub(super) record: Option<PathBuf>,
+    pub(in crate::app) record: Option<PathBuf>,
     /// Write the report as JSON.
     #[arg(long, value_name = "FILE")]
-    pub(super) json: Option<PathBuf>,
+    pub(in crate::app) json: Option<PathBuf>,
 }
 
 impl Products {
     /// Whether a window is to be shown if there can be one: nothing else was asked for.
-    pub(super) fn prefers_window(&self) -> bool {
+    pub(in crate::app) fn prefers_window(&self) -> bool {
         let pictures = self.picture.is_some() || self.frames_out.is_some();
         self.window || !(self.headless || self.offscreen || pictures)
     }
@@ -247,38 +252,28 @@ impl Products {
 
 /// Arguments of the craniotomy.
 #[derive(Args)]
-pub(super) struct CraniotomyArgs {
+pub(in crate::app) struct CraniotomyArgs {
     #[arg(long, value_name = "STEP", value_parser = parse_step,
           help = format!("How far a script operates: {}; in a window not at all if not given, else {}",
                          Step::ALL.map(Step::name).join(", "), Step::All.name()))]
-    pub(super) step: Option<Step>,
+    pub(in crate::app) step: Option<Step>,
     /// The patient's computed tomography, NIfTI or NRRD; a synthetic head if not given
     #[arg(long, value_name = "FILE")]
-    pub(super) ct: Option<PathBuf>,
+    pub(in crate::app) ct: Option<PathBuf>,
     /// Write the computed tomography as it is after the operation, as NIfTI
     #[arg(long, value_name = "FILE.nii.gz")]
-    pub(super) save: Option<PathBuf>,
+    pub(in crate::app) save: Option<PathBuf>,
     #[arg(long, value_name = "HZ", default_value_t = RATE, value_parser = parse_rate,
           help = format!("How often a second the haptic loops of a window's hands tick, 1 to {MAX_RATE}"))]
-    pub(super) haptic_rate: f64,
+    pub(in crate::app) haptic_rate: f64,
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_FRAMES),
           help = format!("Number of frames, 1 to {MAX_FRAMES}; if not given, the operation's own, or in a \
                           window until it is closed"))]
-    pub(super) frames: Option<u64>,
+    pub(in crate::app) frames: Option<u64>,
     #[command(flatten)]
-    pub(super) way: Way,
+    pub(in crate::app) way: Way,
     #[command(flatten)]
-    pub(super) products: Products,
-}
-
-fn parse_rate(text: &str) -> Result<f64, String> {
-    let rate = text.parse().ok().filter(|rate| (1.0..=MAX_RATE).contains(rate));
-    rate.ok_or_else(|| format!("not a number from 1 to {MAX_RATE}"))
-}
-
-fn parse_step(text: &str) -> Result<Step, String> {
-    let known = Step::ALL.into_iter().find(|step| step.name() == text);
-    known.ok_or_else(|| format!("not one of {}", Step::ALL.map(Step::name).join(", ")))
+    pub(in crate::app) products: Products,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -289,7 +284,7 @@ enum BroadPhaseName {
 
 impl Particles {
     /// The number of frames of a run without a window.
-    pub(super) fn frames(&self) -> u64 {
+    pub(in crate::app) fn frames(&self) -> u64 {
         self.frames.unwrap_or(USUAL_FRAMES)
     }
 
@@ -305,56 +300,8 @@ impl Particles {
     }
 }
 
-fn parse_objects(text: &str) -> Result<usize, String> {
-    parse_number(text, ParticleScene::MAX_OBJECTS)
-}
-
-fn parse_threads(text: &str) -> Result<usize, String> {
-    parse_number(text, MAX_THREADS)
-}
-
-/// Executors that a program built without them still knows by name.
-const NATIVE_PEERS: [&str; 4] = ["openmp-static", "openmp-dynamic", "tbb-for", "tbb-pipeline"];
-
-fn parse_executor(text: &str) -> Result<ExecutorKind, String> {
-    let known = ExecutorKind::ALL.iter().find(|kind| kind.name() == text);
-    known.copied().ok_or_else(|| {
-        if NATIVE_PEERS.contains(&text) {
-            "this program was built without the feature `native-peers`".to_owned()
-        } else {
-            format!("there are {}", executor_names())
-        }
-    })
-}
-
-fn executor_names() -> String {
-    let names: Vec<_> = ExecutorKind::ALL.iter().map(|kind| kind.name()).collect();
-    names.join(", ")
-}
-
-fn parse_number(text: &str, most: usize) -> Result<usize, String> {
-    let number = text.parse().ok().filter(|number| (1..=most).contains(number));
-    number.ok_or_else(|| format!("not a whole number from 1 to {most}"))
-}
-
-fn parse_size(text: &str) -> Result<(u32, u32), String> {
-    let (width, height) = text.split_once('x').ok_or("not like 1280x720")?;
-    let pixels = |text: &str| text.parse().ok().filter(|pixels| (1..=MAX_PIXELS).contains(pixels));
-    pixels(width)
-        .zip(pixels(height))
-        .ok_or_else(|| format!("not two whole numbers from 1 to {MAX_PIXELS}"))
-}
-
-fn parse_simd(text: &str) -> Result<Simd, String> {
-    let named = Instructions::ALL.into_iter().find(|instructions| instructions.name() == text);
-    let instructions = named.ok_or_else(|| {
-        format!("not one of {}", Instructions::ALL.map(Instructions::name).join(", "))
-    })?;
-    Simd::new(instructions).map_err(|lacking| lacking.to_string())
-}
-
 /// What the arguments ask for.
-pub(super) enum Outcome {
+pub(in crate::app) enum Outcome {
     Run(Particles),
     Operate(CraniotomyArgs),
     Replay(ReplayArgs),
@@ -365,7 +312,7 @@ pub(super) enum Outcome {
     Bad(String),
 }
 
-pub(super) fn parse() -> Outcome {
+pub(in crate::app) fn parse() -> Outcome {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => return refuse(&error),
