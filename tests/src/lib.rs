@@ -1,14 +1,11 @@
 //! Support for tests of the pipeline as a whole: random virtual environments, a trace of what
-//! their callbacks saw, a checker of that trace, a sequential reference, and a watchdog. And for tests of
-//! the program: how it is built and run.
+//! their callbacks saw, a checker of that trace, a sequential reference, and a watchdog.
 #![forbid(unsafe_code)]
 
 pub mod body;
 pub mod checker;
 pub mod drive;
 pub mod host;
-#[cfg(feature = "sim")]
-pub mod program;
 pub mod random_ve;
 pub mod reference;
 pub mod trace;

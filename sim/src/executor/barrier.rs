@@ -2,14 +2,17 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
+use std::thread::available_parallelism;
 
-/// How often a thread looks before it goes to sleep: some tens of microseconds, about a stage's tail.
+/// How often a thread looks before it goes to sleep: some tens of microseconds, about a stage's tail; on
+/// processors that take long to pause, up to 200.
 const SPINS: u32 = 4_000;
 
 /// A barrier for a fixed number of threads, to be used again and again.
 #[derive(Debug)]
 pub(super) struct Barrier {
     threads: usize,
+    spins: u32,
     arrived: AtomicUsize,
     generation: AtomicUsize,
     sleep: Mutex<()>,
@@ -18,8 +21,11 @@ pub(super) struct Barrier {
 
 impl Barrier {
     pub(super) fn new(threads: usize) -> Self {
+        // Where processors are fewer, whoever spins keeps those from running that are waited for.
+        let processors = available_parallelism().map_or(1, usize::from);
         Self {
             threads,
+            spins: if threads > processors { 0 } else { SPINS },
             arrived: AtomicUsize::new(0),
             generation: AtomicUsize::new(0),
             sleep: Mutex::new(()),
@@ -43,7 +49,7 @@ impl Barrier {
     pub(super) fn wait(&self) {
         let generation = self.generation.load(Ordering::Acquire);
         self.arrive();
-        for _ in 0..SPINS {
+        for _ in 0..self.spins {
             if self.generation.load(Ordering::Acquire) != generation {
                 return;
             }

@@ -1,9 +1,28 @@
 //! Runs models that are expected to fail, and says how they did.
 
 use super::{EXPLORED, lock};
+use std::cell::Cell;
 use std::fmt;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Mutex;
+use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
+use std::sync::{Mutex, Once};
+
+thread_local! {
+    /// Whether this thread looks for failures: their panics are no news.
+    static HUNTING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Panics stay unprinted from now on in threads that hunt, and in no others.
+fn hush() {
+    static HUSHED: Once = Once::new();
+    HUSHED.call_once(|| {
+        let print = take_hook();
+        set_hook(Box::new(move |panic| {
+            if !HUNTING.get() {
+                print(panic);
+            }
+        }));
+    });
+}
 
 /// How a model failed.
 #[derive(Clone, Debug)]
@@ -46,15 +65,15 @@ fn shorten(said: &str) -> String {
     words.chars().take(70).collect()
 }
 
-/// `judge` of every item, in the items' order, on as many threads as there are processors. Panics
-/// inside stay unprinted: they are what is looked for.
+/// `judge` of every item, in the items' order, on as many threads as there are processors.
 pub(crate) fn each<T: Copy + Sync, R: Send>(items: &[T], judge: impl Fn(T) -> R + Sync) -> Vec<R> {
-    std::panic::set_hook(Box::new(|_| ()));
+    hush();
     let (next, judged) = (Mutex::new(0..items.len()), Mutex::new(Vec::new()));
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| {
+                HUNTING.set(true);
                 loop {
                     let Some(at) = lock(&next).next() else { break };
                     let verdict = judge(items[at]);
@@ -63,7 +82,6 @@ pub(crate) fn each<T: Copy + Sync, R: Send>(items: &[T], judge: impl Fn(T) -> R 
             });
         }
     });
-    let _ = std::panic::take_hook();
     let mut judged = judged.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
     judged.sort_by_key(|(at, _)| *at);
     judged.into_iter().map(|(_, verdict)| verdict).collect()

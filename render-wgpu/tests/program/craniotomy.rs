@@ -1,11 +1,10 @@
 //! `dualframe craniotomy`: what it reports, what it refuses, and that what it records comes back.
-#![forbid(unsafe_code)]
 
 use std::fs;
 
+use crate::command::{read_json, run, told};
 use dualframe_sim::image::Image;
 use dualframe_sim::scene::head::synthetic_ct;
-use dualframe_tests::program::{read_json, run, told};
 
 #[test]
 fn an_operation_is_reported_recorded_and_saved() {

@@ -1,10 +1,9 @@
 //! Each protocol bug that can be seeded into the core's own code (`core/src/instrument.rs`) makes
 //! the model fail that is named for it here.
 
-mod models;
-
+use crate::models::hunt::{Kill, each, kill};
+use crate::models::named;
 use dualframe_core_model::instrument::{Fault, seed};
-use models::hunt::{Kill, each, kill};
 
 /// The model that has to notice.
 fn killer(fault: Fault) -> &'static str {
@@ -44,7 +43,7 @@ fn killer(fault: Fault) -> &'static str {
 fn every_seeded_bug_is_noticed() {
     let judge = |fault| -> Option<Kill> {
         seed(Some(fault));
-        kill(models::named(killer(fault)))
+        kill(named(killer(fault)))
     };
     let kills = each(Fault::ALL, judge);
     println!("| fault | what is wrong | killed by | executions | how |\n|---|---|---|---|---|");

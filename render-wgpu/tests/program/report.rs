@@ -1,9 +1,8 @@
 //! The program from outside: its report, and what it says to bad input.
-#![forbid(unsafe_code)]
 
 use std::path::Path;
 
-use dualframe_tests::program::{command, report, run, told};
+use crate::command::{command, report, run, told};
 
 /// Exit status 2, one line on standard error that holds `part`, nothing on standard output.
 fn refused(args: &[&str], part: &str) {

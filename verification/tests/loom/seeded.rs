@@ -1,13 +1,13 @@
 //! Seeded bugs: the same models, run on parts that are broken the way such parts usually are, must
 //! fail, and for the reason that was seeded.
 
-mod models;
-
+use crate::models::arrivals::Meets;
+use crate::models::countdown::Counts;
+use crate::models::ring::Queue;
+use crate::models::{
+    Guarded, Role, arrivals, check, cost, countdown, lend, lend_slice, named, ring, together,
+};
 use loom::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
-use models::arrivals::Meets;
-use models::countdown::Counts;
-use models::ring::Queue;
-use models::{Guarded, Role, arrivals, check, cost, countdown, lend, lend_slice, ring, together};
 use std::panic::catch_unwind;
 
 /// Asserts that `model` fails, saying `reason`.
@@ -27,7 +27,7 @@ fn a_bound_that_is_too_small_is_noticed() {
     cost::tighten(50);
     caught(cost::ALL[0].1, "accesses, ");
     cost::tighten(20);
-    caught(models::named("pipeline::spatial_after_update"), "accesses, ");
+    caught(named("pipeline::spatial_after_update"), "accesses, ");
 }
 
 /// A ring whose push takes a ticket first and fills the slot later. Positions count from 1.

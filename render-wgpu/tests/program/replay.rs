@@ -1,15 +1,14 @@
 //! The program's recordings, and what it says of them.
-#![forbid(unsafe_code)]
 
 use std::fs;
 use std::path::Path;
 
+use crate::command::{read_json, report, run, told};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::record::wire::{Decoder, Encoder, Malformed};
 use dualframe_sim::record::{Header, Recorder, SceneSpec};
 use dualframe_sim::render::NullRenderer;
 use dualframe_sim::scene::ParticleScene;
-use dualframe_tests::program::{read_json, report, run, told};
 use serde_json::Value;
 use tempfile::TempDir;
 

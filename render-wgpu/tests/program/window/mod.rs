@@ -1,5 +1,4 @@
 //! The program's window, by what a person does to it and sees in it.
-#![forbid(unsafe_code)]
 
 mod controls;
 mod craniotomy;
@@ -8,7 +7,7 @@ mod desktop;
 use std::collections::BTreeMap;
 use std::thread::sleep;
 
-use dualframe_tests::program::{NO_ADAPTERS, read_json, report, run, told};
+use crate::command::{NO_ADAPTERS, read_json, report, run, told};
 use serde_json::Value;
 
 use self::desktop::{Desktop, STILL, Screenshot};

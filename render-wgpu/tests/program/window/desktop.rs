@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use dualframe_tests::program::{command, read_json};
+use crate::command::{command, read_json};
 use serde_json::Value;
 use tempfile::TempDir;
 use x11rb::CURRENT_TIME;

@@ -1,6 +1,6 @@
 //! A person operates: the mouse is the tool.
 
-use dualframe_tests::program::{read_json, run};
+use crate::command::{read_json, run};
 use serde_json::Value;
 
 use super::desktop::{Desktop, Session};

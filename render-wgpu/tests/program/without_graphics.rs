@@ -2,11 +2,10 @@
 //! run simulates all the same, and what cannot draw says in one line why.
 // Elsewhere the environment hides neither the display nor the adapters.
 #![cfg(target_os = "linux")]
-#![forbid(unsafe_code)]
 
 use std::process::Output;
 
-use dualframe_tests::program::{NO_ADAPTERS, command, told};
+use crate::command::{NO_ADAPTERS, command, told};
 
 /// What a run says, of few objects and frames, with more arguments and variables of the environment.
 fn run(args: &[&str], environment: &[(&str, &str)]) -> Output {

@@ -1,14 +1,14 @@
 //! Runs every model. Plain `cargo test` does: the library under test is compiled under loom
 //! whatever the environment says.
 
-mod models;
+use crate::models::{all, named};
 
 macro_rules! explored {
     ($($primitive:ident: $($model:ident)*;)*) => {
         $(mod $primitive {
             $(#[test]
             fn $model() {
-                super::models::named(concat!(stringify!($primitive), "::", stringify!($model)))();
+                super::named(concat!(stringify!($primitive), "::", stringify!($model)))();
             })*
         })*
         const EXPLORED: &[&str] = &[$($(concat!(stringify!($primitive), "::", stringify!($model))),*),*];
@@ -33,7 +33,7 @@ explored! {
 /// No model is left out of the list above.
 #[test]
 fn every_model_has_a_test() {
-    let mut listed: Vec<_> = models::all().map(|(name, _)| name).collect();
+    let mut listed: Vec<_> = all().map(|(name, _)| name).collect();
     let mut explored = EXPLORED.to_vec();
     listed.sort_unstable();
     explored.sort_unstable();

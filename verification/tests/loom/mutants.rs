@@ -1,27 +1,26 @@
 //! Each model is able to fail: every memory order of the core that is not Relaxed is weakened by
 //! one step, alone, and some model must notice. A fence is weakened to none as well.
 
-mod models;
-
+use crate::models::hunt::{Kill, each, kill};
+use crate::models::{Model, arrivals, bell, countdown, inbox, latest, pipeline, ring, token};
 use dualframe_core_model::instrument::weaken;
 use dualframe_core_model::sync::{Site, site};
-use models::hunt::{Kill, each, kill};
 use std::sync::atomic::Ordering::{self, AcqRel, Acquire, Relaxed, Release, SeqCst};
 
 /// Mutants that no model notices, each with the reason why the site may stay as it is.
 const EXPECTED_SURVIVORS: &[(&str, Ordering, &str)] = &[];
 
 /// The models to try on a site, by the start of its name; the first that fails ends the search.
-fn suspects(name: &str) -> &'static [models::Model] {
+fn suspects(name: &str) -> &'static [Model] {
     match name.split('_').next().unwrap_or_default() {
-        "RING" => models::ring::ALL,
-        "COUNTDOWN" => models::countdown::ALL,
-        "ARRIVALS" => models::arrivals::ALL,
-        "MAIL" => models::inbox::ALL,
-        "LATEST" | "READERS" => models::latest::ALL,
-        "BELL" | "FENCE" => models::bell::ALL,
-        "TOKEN" | "STATIC" => models::token::ALL,
-        "DISPLAY" => models::pipeline::ALL,
+        "RING" => ring::ALL,
+        "COUNTDOWN" => countdown::ALL,
+        "ARRIVALS" => arrivals::ALL,
+        "MAIL" => inbox::ALL,
+        "LATEST" | "READERS" => latest::ALL,
+        "BELL" | "FENCE" => bell::ALL,
+        "TOKEN" | "STATIC" => token::ALL,
+        "DISPLAY" => pipeline::ALL,
         _ => panic!("no model is assigned to {name}"),
     }
 }

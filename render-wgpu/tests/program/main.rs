@@ -1,0 +1,9 @@
+//! The `dualframe` program from outside.
+#![forbid(unsafe_code)]
+
+mod command;
+mod craniotomy;
+mod replay;
+mod report;
+mod window;
+mod without_graphics;
