@@ -257,30 +257,6 @@ fn a_closed_cut_frees_a_piece() {
     assert_eq!(pieces(&surface), 2);
 }
 
-/// Two discs that share their middle: an edge that is cut from there goes with its own disc.
-#[test]
-fn a_pinched_node_takes_its_slit_along() {
-    let node = |x: f32, y: f32, z: f32| {
-        let rest = Vec3::new(x, y, z) * EDGE;
-        CutNode { rest, position: rest, velocity: Vec3::ZERO }
-    };
-    let ring = |z: f32| [node(1.0, 0.0, z), node(0.0, 1.0, z), node(-1.0, -1.0, z)];
-    let disc = |first: u32| [0, 1, 2].map(|side| [0, first + side, first + (side + 1) % 3]);
-    let mut surface = CutSurface {
-        nodes: [node(0.0, 0.0, 0.0)].into_iter().chain(ring(-1.0)).chain(ring(1.0)).collect(),
-        triangles: disc(1).into_iter().chain(disc(4)).collect(),
-        slits: Vec::new(),
-        births: Vec::new(),
-        shortest: 0.1 * EDGE,
-    };
-    surface.slit([5, 0]);
-    surface.separate();
-    assert_eq!(surface.births, [Birth::Copy(0)]);
-    assert_eq!(surface.triangles[..3], disc(1));
-    assert!(surface.triangles[3..].iter().all(|triangle| triangle[0] == 7));
-    assert_eq!(surface.slits, [[5, 7]]);
-}
-
 #[test]
 fn what_the_blade_does_not_reach_is_not_cut() {
     let mut surface = patch();
