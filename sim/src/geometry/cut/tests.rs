@@ -257,6 +257,25 @@ fn a_closed_cut_frees_a_piece() {
     assert_eq!(pieces(&surface), 2);
 }
 
+/// Two patches that share a node: an edge that is cut from there goes with its own patch.
+#[test]
+fn a_pinched_node_takes_its_slit_along() {
+    let mut surface = patch();
+    let (all, middle) = (surface.nodes.len() as u32, surface.nodes.len() as u32 / 2);
+    let other = |node: u32| if node == middle { middle } else { node + all };
+    let second: Vec<[u32; 3]> =
+        surface.triangles.iter().map(|triangle| triangle.map(other)).collect();
+    surface.nodes.extend_from_within(..);
+    surface.triangles.extend(second);
+    surface.slit([middle, other(middle + 1)]);
+    surface.separate();
+    assert_eq!(surface.births, [Birth::Copy(middle)]);
+    assert_eq!(surface.slits, [[other(middle + 1), 2 * all]]);
+    assert!(
+        surface.fan(middle).all(|place| surface.triangles[place].iter().all(|&node| node < all))
+    );
+}
+
 #[test]
 fn what_the_blade_does_not_reach_is_not_cut() {
     let mut surface = patch();
