@@ -81,6 +81,8 @@ impl Theatre {
     }
 }
 
+/// The frames before the retraction's end in which the scalp is drawn aside, and a few more.
+const DRAWING: u64 = 160;
 /// The operative scalp is the first structure.
 const SCALP: ObjectId = FIRST_STRUCTURE;
 const PIECE: ObjectId = ObjectId(SKULL.0 + 1);
@@ -103,6 +105,11 @@ fn gaps(scalp: &Object) -> Vec<f32> {
 fn mass(object: &Object) -> f64 {
     let masses = object.geometry.as_mesh().expect("tissue").masses();
     masses.iter().map(|&mass| f64::from(mass)).sum()
+}
+
+/// How many of its nodes are held.
+fn pins(scalp: &Object) -> usize {
+    Tissue::of(scalp).expect("tissue").pins().len()
 }
 
 #[test]
@@ -134,6 +141,9 @@ fn an_operation() {
     let before = theatre.read(SCALP, mass);
     let theatre = theatre.run(frames(Step::Incision));
     the_incision_gapes(&theatre, before);
+    let before = theatre.read(SCALP, pins);
+    let theatre = theatre.run(frames(Step::Retraction) - DRAWING);
+    the_flap_is_scraped_off(&theatre, before);
     let theatre = theatre.run(frames(Step::Retraction));
     the_bone_is_bare(&theatre);
     let theatre = theatre.run(frames(Step::BurrHole));
@@ -150,6 +160,12 @@ fn the_incision_gapes(theatre: &Theatre, before: f64) {
     assert!(gaps.len() > 12, "{} nodes were parted along 90 mm", gaps.len());
     let half = gaps[gaps.len() / 2];
     assert!(half > 0.001_5, "half of the edges are less than {half} m apart: {gaps:?}");
+}
+
+/// Before it is drawn aside, it is free: tissue that is drawn would tear off by itself in the end.
+fn the_flap_is_scraped_off(theatre: &Theatre, before: usize) {
+    let left = theatre.read(SCALP, pins);
+    assert!(left + 40 < before, "{left} of {before} nodes are still held");
 }
 
 /// Drawn aside, the flap leaves a wound at least 15 mm wide, and both tools hold scalp.

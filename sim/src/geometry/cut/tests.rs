@@ -257,31 +257,23 @@ fn a_closed_cut_frees_a_piece() {
     assert_eq!(pieces(&surface), 2);
 }
 
-/// Two discs that share their middle: an edge that is cut from there goes with its own disc, and still opens
-/// at the border.
+/// Two patches that share a node: an edge that is cut from there goes with its own patch.
 #[test]
 fn a_pinched_node_takes_its_slit_along() {
-    let node = |x: f32, y: f32, z: f32| {
-        let rest = Vec3::new(x, y, z) * EDGE;
-        CutNode { rest, position: rest, velocity: Vec3::ZERO }
-    };
-    let ring = |z: f32| [node(1.0, 0.0, z), node(0.0, 1.0, z), node(-1.0, -1.0, z)];
-    let disc = |first: u32| [0, 1, 2].map(|side| [0, first + side, first + (side + 1) % 3]);
-    let mut surface = CutSurface {
-        nodes: [node(0.0, 0.0, 0.0)].into_iter().chain(ring(-1.0)).chain(ring(1.0)).collect(),
-        triangles: disc(1).into_iter().chain(disc(4)).collect(),
-        slits: Vec::new(),
-        births: Vec::new(),
-        shortest: 0.1 * EDGE,
-    };
-    surface.slit([5, 0]);
+    let mut surface = patch();
+    let (all, middle) = (surface.nodes.len() as u32, surface.nodes.len() as u32 / 2);
+    let other = |node: u32| if node == middle { middle } else { node + all };
+    let second: Vec<[u32; 3]> =
+        surface.triangles.iter().map(|triangle| triangle.map(other)).collect();
+    surface.nodes.extend_from_within(..);
+    surface.triangles.extend(second);
+    surface.slit([middle, other(middle + 1)]);
     surface.separate();
-    assert_eq!(surface.births, [Birth::Copy(0), Birth::Copy(5)]);
-    assert_eq!(surface.triangles[..3], disc(1));
-    assert!(surface.triangles[3..].iter().all(|triangle| triangle[0] == 7));
-    let with = |node: u32| surface.triangles.iter().filter(|it| it.contains(&node)).count();
-    assert_eq!([with(5), with(8)], [1, 1]);
-    assert!(surface.slits.is_empty());
+    assert_eq!(surface.births, [Birth::Copy(middle)]);
+    assert_eq!(surface.slits, [[other(middle + 1), 2 * all]]);
+    assert!(
+        surface.fan(middle).all(|place| surface.triangles[place].iter().all(|&node| node < all))
+    );
 }
 
 #[test]
