@@ -14,7 +14,7 @@ use dualframe_sim::device::link::{SimulationEnd, ToolState};
 use dualframe_sim::executor::FrameRecord;
 use dualframe_sim::geometry::{Bounds, Volume};
 use dualframe_sim::image;
-use dualframe_sim::manager::{Settings, VeManager};
+use dualframe_sim::manager::VeManager;
 use dualframe_sim::render::{NullRenderer, Renderer};
 use dualframe_sim::scene::Scene;
 use dualframe_sim::scene::craniotomy::{
@@ -26,6 +26,7 @@ use glam::Vec3;
 use super::AllocationCounter;
 use super::args::CraniotomyArgs;
 use super::haptics::{Cells, Each, Loops};
+use super::manage::{Manage, manage};
 use super::measure::Measure;
 use super::outputs::{self, Outputs};
 use super::particles::{RunError, SHOWN_SPANS, TRACED_SPANS, progress_bar};
@@ -37,9 +38,6 @@ use super::window::{CraniotomyAtHand, Session, most_threads};
 
 /// From how far the place of the operation is seen, over the size of its box.
 const DISTANCE: f32 = 1.4;
-
-/// What makes a manager of a scene.
-type Manage<'a> = &'a dyn Fn(Scene) -> Result<VeManager, RunError>;
 
 /// Operates as `args` say. `note` is told what the person at the terminal should know.
 pub(super) fn run(
@@ -101,18 +99,6 @@ fn run_beside<'c>(
     }
     let report = Report::of("craniotomy", args.way.simd(), &manager, &measure);
     Ok(Report { operation: Some(surgery.report(&manager)), ..report })
-}
-
-fn manage(
-    scene: Scene,
-    settings: Settings,
-    timeline: Option<&Arc<Timeline>>,
-) -> Result<VeManager, RunError> {
-    let mut manager = VeManager::new(scene, settings)?;
-    if let Some(timeline) = timeline {
-        manager.watch(Arc::clone(timeline));
-    }
-    Ok(manager)
 }
 
 /// Runs without a window: a script operates.

@@ -4,6 +4,7 @@ mod args;
 mod craniotomy;
 mod experiment;
 mod haptics;
+mod manage;
 mod measure;
 mod outputs;
 mod particles;

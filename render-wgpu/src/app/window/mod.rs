@@ -39,6 +39,7 @@ use self::hand::Hand;
 pub(super) use self::particles::ParticlesAtHand;
 use self::view::{Shown, View};
 use super::args::{Products, Way};
+use super::manage::{Manage, manage};
 use super::particles::RunError;
 use super::pictures;
 use super::recording::Recording;
@@ -49,9 +50,6 @@ const RUN_SECONDS: f32 = 0.05;
 const RUN_FRAMES: u64 = 32;
 /// How long one waits for events while nothing moves.
 const IDLE: Duration = Duration::from_millis(100);
-
-/// Makes a manager of a scene, by what the person has set.
-pub(super) type Manage<'a> = &'a dyn Fn(Scene) -> Result<VeManager, RunError>;
 
 /// What a window shows, and what a person can do to it.
 pub(super) trait Scenario {
@@ -192,7 +190,8 @@ impl<'a, S: Scenario> Session<'a, S> {
             stats.borrow_mut().note(record);
             on_frame(record);
         };
-        let manage = manage::<S>(self.way, self.applied, Arc::clone(&self.view.timeline));
+        let (settings, timeline) = (self.settings(), Arc::clone(&self.view.timeline));
+        let manage = move |scene| manage(scene, settings, Some(&timeline));
         let host = (&mut on_frame as &mut dyn FnMut(&FrameRecord), &manage as Manage<'_>);
         self.scenario.advance(&mut self.view, manager, recording, frames, host)
     }
@@ -247,22 +246,13 @@ impl<'a, S: Scenario> Session<'a, S> {
     }
 
     fn manage(&self, scene: Scene) -> Result<VeManager, RunError> {
-        manage::<S>(self.way, self.applied, Arc::clone(&self.view.timeline))(scene)
+        manage(scene, self.settings(), Some(&self.view.timeline))
     }
-}
 
-/// What makes a manager of a scene.
-fn manage<S: Scenario>(
-    way: &Way,
-    controls: Controls,
-    timeline: Arc<Timeline>,
-) -> impl Fn(Scene) -> Result<VeManager, RunError> {
-    let Controls { executor, threads, .. } = controls;
-    let entry = controls.entry();
-    let settings = Settings { executor, threads, entry, ..way.settings(S::GRAIN) };
-    move |scene| {
-        let mut manager = VeManager::new(scene, settings)?;
-        manager.watch(Arc::clone(&timeline));
-        Ok(manager)
+    /// What the person has set.
+    fn settings(&self) -> Settings {
+        let Controls { executor, threads, .. } = self.applied;
+        let entry = self.applied.entry();
+        Settings { executor, threads, entry, ..self.way.settings(S::GRAIN) }
     }
 }

@@ -16,11 +16,12 @@ use dualframe_sim::manager::VeManager;
 use dualframe_sim::scene::Scene;
 
 use self::grip::{Devices, ToolGrip};
+use super::Scenario;
 use super::view::View;
-use super::{Manage, Scenario};
 use crate::app::args::CraniotomyArgs;
 use crate::app::craniotomy::{self, Surgery};
 use crate::app::haptics::{Each, Loops};
+use crate::app::manage::Manage;
 use crate::app::particles::RunError;
 use crate::app::recording::Recording;
 use crate::app::scenes::Patient;

@@ -16,9 +16,10 @@ use glam::Vec3;
 
 use self::grip::Grip;
 use self::physics::Physics;
+use super::Scenario;
 use super::view::View;
-use super::{Manage, Scenario};
 use crate::app::args::Particles;
+use crate::app::manage::Manage;
 use crate::app::particles::{self, RunError};
 use crate::app::recording::Recording;
 
