@@ -3,7 +3,6 @@
 //! Anybody may submit a unit from any thread; whoever holds the render token runs it, since nobody else
 //! may call the device.
 
-use std::cell::RefCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -14,7 +13,7 @@ use wgpu::{Buffer, CommandEncoder, MapMode, PollType};
 use crate::error::GraphicsError;
 use crate::globals::View;
 use crate::gpu::Gpu;
-use crate::pick::{Found, Picker};
+use crate::pick::Picker;
 use crate::springs::Integrator;
 use crate::surface::Surfaces;
 
@@ -47,7 +46,6 @@ pub struct Context<'a> {
     pub(crate) surfaces: &'a Surfaces,
     pub(crate) picker: &'a Picker,
     pub(crate) integrator: &'a Integrator,
-    pub(crate) found: &'a RefCell<Vec<Found>>,
 }
 
 /// The queue is full, and the unit came back.

@@ -3,8 +3,7 @@
 use std::sync::mpsc::Sender;
 
 use bytemuck::{Pod, Zeroable};
-use dualframe_sim::geometry::Mesh;
-use dualframe_sim::object::{Object, ObjectId};
+use dualframe_sim::object::ObjectId;
 use glam::{Mat4, Vec2, Vec3};
 use wgpu::{
     BindGroup, Buffer, BufferDescriptor, BufferUsages, ColorTargetState, CommandEncoder, Device,
@@ -21,15 +20,15 @@ use crate::globals::{self, Globals};
 use crate::surface::{INSTANCES, Layouts};
 use crate::target::{DEPTH, texture};
 
-/// The object's number plus one, and its depth.
-const FORMAT: TextureFormat = TextureFormat::Rg32Uint;
+/// The object's number plus one, the node's number, and the depth.
+const FORMAT: TextureFormat = TextureFormat::Rgba32Uint;
 
 /// What is under a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Picked {
     /// The object.
     pub object: ObjectId,
-    /// Its node nearest to the place.
+    /// A corner of the triangle there, by the node's number; of a shape that is not deformed, by its own.
     pub node: u32,
     /// The place, in metres.
     pub place: Vec3,
@@ -39,8 +38,7 @@ pub struct Picked {
 pub struct Pick {
     /// The pixel's middle, from (−1, −1) at the lower left of the picture to (1, 1).
     pub point: Vec2,
-    /// Where the answer goes: `None` if there is no object. Without an answer the device failed, or the
-    /// object has gone meanwhile.
+    /// Where the answer goes: `None` if there is no object. Without an answer the device failed.
     pub answer: Sender<Option<Picked>>,
 }
 
@@ -56,44 +54,9 @@ impl GpuUnit for Pick {
     fn finish(self: Box<Self>, context: &Context<'_>, results: Result<&[u8], GraphicsError>) {
         let hit = results.ok().and_then(|bytes| bytes.get(..size_of::<Hit>()));
         let Some(hit) = hit.map(bytemuck::pod_read_unaligned::<Hit>) else { return };
-        match hit.resolve(context, self.point) {
-            Some((object, place)) => {
-                let found = Found { object, place, answer: self.answer };
-                context.found.borrow_mut().push(found);
-            }
-            // Whoever asked may have gone.
-            None => drop(self.answer.send(None)),
-        }
+        // Whoever asked may have gone.
+        let _ = self.answer.send(hit.resolve(context, self.point));
     }
-}
-
-/// An object that was under a pixel. Its node is found when the object comes to be drawn again: the device
-/// alone has the positions of the frame that it was in.
-pub(crate) struct Found {
-    object: ObjectId,
-    place: Vec3,
-    answer: Sender<Option<Picked>>,
-}
-
-impl Found {
-    /// Answers, if it is this object.
-    pub(crate) fn meet(&self, other: &Object) -> bool {
-        let Self { object, place, .. } = *self;
-        let is_it = object == other.id();
-        if is_it {
-            let node = other.geometry.as_mesh().map_or(0, |mesh| nearest(mesh, place));
-            // Whoever asked may have gone.
-            let _ = self.answer.send(Some(Picked { object, node, place }));
-        }
-        is_it
-    }
-}
-
-/// The node nearest to a place.
-fn nearest(mesh: &Mesh, place: Vec3) -> u32 {
-    let distances = mesh.positions.iter().map(|node| node.distance_squared(place));
-    let nearest = distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
-    nearest.map_or(0, |(node, _)| node as u32)
 }
 
 /// What the device finds under a pixel.
@@ -101,15 +64,17 @@ fn nearest(mesh: &Mesh, place: Vec3) -> u32 {
 #[repr(C)]
 struct Hit {
     object_plus_one: u32,
+    node: u32,
     depth: u32,
+    unused: u32,
 }
 
 impl Hit {
-    fn resolve(self, context: &Context<'_>, point: Vec2) -> Option<(ObjectId, Vec3)> {
+    fn resolve(self, context: &Context<'_>, point: Vec2) -> Option<Picked> {
         let object = self.object_plus_one.checked_sub(1)?;
         let clip = point.extend(f32::from_bits(self.depth));
         let place = context.view.view_projection.inverse().project_point3(clip);
-        Some((ObjectId(object), place))
+        Some(Picked { object: ObjectId(object), node: self.node, place })
     }
 }
 

@@ -1,7 +1,5 @@
 //! The renderer: what the token's holder draws with.
 
-use std::cell::RefCell;
-
 use dualframe_sim::geometry::Geometry;
 use dualframe_sim::object::Object;
 use dualframe_sim::render::Renderer;
@@ -16,7 +14,7 @@ use crate::error::GraphicsError;
 use crate::globals::{Globals, View};
 use crate::gpu::Gpu;
 use crate::look::Look;
-use crate::pick::{Found, Picker};
+use crate::pick::Picker;
 use crate::picture::{Picture, read_texture};
 use crate::room::Room;
 use crate::springs::{GpuMassSpring, Integrator};
@@ -45,8 +43,6 @@ pub struct Painter {
     picker: Picker,
     integrator: Integrator,
     units: Units,
-    /// What was picked and waits for its node.
-    found: RefCell<Vec<Found>>,
     format: Format,
     target: Target,
     /// The frame being drawn, from its first object on.
@@ -78,7 +74,6 @@ impl Painter {
             picker: Picker::new(device, &layouts),
             integrator: Integrator::default(),
             units: Units::new(),
-            found: RefCell::default(),
             target: Target::new(device, format, size.0, size.1),
             camera: Camera::around(&look.focus),
             layouts,
@@ -136,7 +131,7 @@ impl Painter {
     /// a [`GpuMassSpring`] are integrated in any case.
     pub fn add(&mut self, object: &Object) {
         let size = self.size();
-        let Self { gpu, layouts, surfaces, volumes, picker, integrator, units, found, .. } = self;
+        let Self { gpu, layouts, surfaces, volumes, picker, integrator, units, .. } = self;
         let view = self.view.get_or_insert_with(|| {
             surfaces.clear(&gpu.queue);
             volumes.clear();
@@ -148,10 +143,9 @@ impl Painter {
         if let Some(springs) = GpuMassSpring::of(object)
             && gpu.failure().is_none()
         {
-            let context = Context { gpu, view, size, surfaces, picker, integrator, found };
+            let context = Context { gpu, view, size, surfaces, picker, integrator };
             springs.integrate(&context, units);
         }
-        found.get_mut().retain(|found| !found.meet(object));
         if !view.may_see(&object.bounds()) {
             return;
         }
@@ -215,10 +209,8 @@ impl Painter {
         self.volumes.paint(&mut pass, &self.globals.lit);
         drop(pass);
         let size = self.size();
-        let Self { gpu, surfaces, picker, integrator, units, found, .. } = self;
-        // An object that was not drawn again has gone.
-        found.get_mut().clear();
-        let context = Context { gpu, view: &view, size, surfaces, picker, integrator, found };
+        let Self { gpu, surfaces, picker, integrator, units, .. } = self;
+        let context = Context { gpu, view: &view, size, surfaces, picker, integrator };
         units.finish(&context);
         units.run_now(&context);
         units.encode(&context, encoder);

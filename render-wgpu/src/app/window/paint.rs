@@ -6,7 +6,7 @@ use egui_wgpu::{Renderer, RendererOptions, ScreenDescriptor};
 use egui_winit::State;
 use wgpu::{
     CommandBuffer, CommandEncoder, LoadOp, Operations, RenderPassColorAttachment,
-    RenderPassDescriptor, StoreOp, TextureFormat, TextureView,
+    RenderPassDescriptor, StoreOp, Texture, TextureFormat,
 };
 use winit::window::Window;
 
@@ -30,13 +30,13 @@ impl OverlayPainter {
         State::new(self.context.clone(), ViewportId::ROOT, window, None, None, Some(most))
     }
 
-    /// Lays out what `show` says and encodes how it is drawn over `picture`. Some commands must be
-    /// submitted before the encoder's.
+    /// Lays out what `show` says and encodes how it is drawn over `picture`, which may be of another size
+    /// than the window has by now. Some commands must be submitted before the encoder's.
     pub(super) fn paint(
         &mut self,
         gpu: &Gpu,
         (window, input): (&Window, &mut State),
-        (encoder, picture): (&mut CommandEncoder, &TextureView),
+        (encoder, picture): (&mut CommandEncoder, &Texture),
         show: impl FnMut(&mut Ui),
     ) -> Vec<CommandBuffer> {
         let Gpu { device, queue, .. } = gpu;
@@ -48,16 +48,16 @@ impl OverlayPainter {
             }
         }
         let triangles = self.context.tessellate(output.shapes, output.pixels_per_point);
-        let size = window.inner_size();
         let screen = ScreenDescriptor {
-            size_in_pixels: [size.width, size.height],
+            size_in_pixels: [picture.width(), picture.height()],
             pixels_per_point: output.pixels_per_point,
         };
         let before = self.renderer.update_buffers(device, queue, encoder, &triangles, &screen);
+        let picture = picture.create_view(&Default::default());
         let pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("overlay"),
             color_attachments: &[Some(RenderPassColorAttachment {
-                view: picture,
+                view: &picture,
                 depth_slice: None,
                 resolve_target: None,
                 ops: Operations { load: LoadOp::Load, store: StoreOp::Store },

@@ -277,7 +277,7 @@ impl<H: Hand> View<H> {
             Some(egui) => overlay_painter.paint(
                 painter.gpu(),
                 (&self.window, egui),
-                (&mut encoder, &picture),
+                (&mut encoder, texture),
                 |ui| overlay.show(ui, (controls, hand), &camera, &stats.borrow(), timeline),
             ),
             None => Vec::new(),
