@@ -135,7 +135,10 @@ impl ApplicationHandler for Input {
                     MouseScrollDelta::PixelDelta(by) => (by.y * LINES_PER_PIXEL) as f32,
                 }));
             }
-            WindowEvent::KeyboardInput { event, .. } if !is_taken => self.key(&event),
+            // A key that was down before the window had the keyboard was struck elsewhere.
+            WindowEvent::KeyboardInput { event, is_synthetic: false, .. } if !is_taken => {
+                self.key(&event);
+            }
             _ => {}
         }
     }

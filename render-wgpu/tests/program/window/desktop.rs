@@ -112,9 +112,20 @@ impl Desktop {
             self.window_called("dualframe")
         });
         session.wait_for("a picture", Screenshot::is_drawn);
-        let focus = InputFocus::PARENT;
-        self.sync(self.connection.set_input_focus(focus, session.window, CURRENT_TIME));
+        self.focus(session.window);
         session
+    }
+
+    /// Gives a window the keyboard.
+    fn focus(&self, window: Window) {
+        let asked = self.connection.set_input_focus(InputFocus::PARENT, window, CURRENT_TIME);
+        self.sync(asked);
+    }
+
+    /// Presses the key of a symbol, or lets it go.
+    fn key(&self, symbol: char, is_down: bool) {
+        let kind = if is_down { KEY_PRESS_EVENT } else { KEY_RELEASE_EVENT };
+        self.fake(kind, self.keycode(symbol.into()), 0, 0);
     }
 
     fn window_called(&self, title: &str) -> Option<Window> {
@@ -241,9 +252,18 @@ impl Session<'_> {
 
     /// Strikes the key of a symbol; letters are their own.
     pub(crate) fn strike(&self, symbol: char) {
-        let code = self.desktop.keycode(symbol.into());
-        self.desktop.fake(KEY_PRESS_EVENT, code, 0, 0);
-        self.desktop.fake(KEY_RELEASE_EVENT, code, 0, 0);
+        self.desktop.key(symbol, true);
+        self.desktop.key(symbol, false);
+    }
+
+    /// Holds a key while another window has the keyboard and then this one.
+    pub(crate) fn come_back_with(&self, symbol: char) {
+        self.desktop.focus(self.desktop.root);
+        self.desktop.key(symbol, true);
+        self.desktop.focus(self.window);
+        // Less than what repeats a key, 0.66 s.
+        sleep(GLANCE);
+        self.desktop.key(symbol, false);
     }
 
     pub(crate) fn resize(&self, width: u32, height: u32) {

@@ -160,6 +160,20 @@ fn space_pauses_and_n_computes_single_frames() {
     assert_eq!(short, None, "each of the last frames was computed alone");
 }
 
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn a_key_that_was_down_before_is_not_struck() {
+    let desktop = Desktop::start();
+    let mut session = desktop.open(&ONE);
+    session.strike(' ');
+    session.wait_until_still();
+    session.come_back_with(' ');
+    // Seen when what came before it is, too.
+    session.strike('h');
+    session.wait_until_still();
+    session.close();
+}
+
 /// When the first work of each frame was begun, in seconds.
 fn begins_of_frames(trace: &Value) -> Vec<f64> {
     let mut begins = BTreeMap::new();
