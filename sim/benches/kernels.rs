@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use ceiling::Ceiling;
-use dualframe_sim::behavior::MassSpring;
+use dualframe_sim::behavior::{MassSpring, Workspace};
 use dualframe_sim::block::Block;
 use dualframe_sim::geometry::{Geometry, ICOSPHERE_NODES, Mesh, Topology, edges, icosphere};
 use dualframe_sim::interaction::Rules;
@@ -140,10 +140,12 @@ fn entrants(topology: &Arc<Topology>) -> Vec<Entrant> {
                 callback_budget: None,
                 simd,
             };
+            let mut workspace = Workspace::default();
             let advance = Box::new(move || {
                 for frame in 0..case.frames() {
                     for block in black_box(&mut blocks) {
-                        stages.update(frame, block, |_| std::iter::empty(), &mut |_, _, _| {});
+                        let nobody = |_| std::iter::empty();
+                        stages.update(frame, block, &mut workspace, nobody, &mut |_, _, _| {});
                     }
                 }
             });

@@ -1,8 +1,7 @@
 //! Blocks of spatially close objects: the units that executors schedule.
 
-use crate::behavior::{Segment, Workspace};
 use crate::geometry::{Bounds, LANES, Lanes};
-use crate::interaction::{Contact, group_set};
+use crate::interaction::group_set;
 use crate::object::{Object, ObjectId};
 use crate::simd::{Isa, Kernel, LaneSet, Simd, first_lanes, lanes};
 
@@ -11,7 +10,6 @@ use crate::simd::{Isa, Kernel, LaneSet, Simd, first_lanes, lanes};
 pub struct Block {
     pub(crate) objects: Vec<Object>,
     pub(crate) boxes: Boxes,
-    pub(crate) gathered: Gathered,
     bounds: Option<Bounds>,
     groups: u32,
 }
@@ -38,14 +36,6 @@ impl Block {
         self.bounds.unwrap_or(Bounds::EMPTY)
     }
 
-    /// Takes over a segment of this frame's interaction results. Before a block is updated it must be
-    /// given all that concern its objects, in any order; others are ignored.
-    pub fn receive(&mut self, segment: &[Contact]) {
-        if segment.first().is_some_and(|record| self.find(record.object).is_some()) {
-            self.gathered.push(segment);
-        }
-    }
-
     /// The groups of its objects that may interact, a bit each.
     pub(crate) fn groups(&self) -> u32 {
         self.groups
@@ -67,44 +57,9 @@ impl Block {
         self.bounds = Some(bounds);
     }
 
-    /// The place of an object among [`Block::objects`].
-    fn find(&self, id: ObjectId) -> Option<usize> {
-        self.objects.binary_search_by_key(&id, Object::id).ok()
-    }
-}
-
-/// Contact records of one object in one frame for which a block has room from the start; usually 96,
-/// twice what the densest pile has, so that a frame need not allocate.
-pub(crate) const CONTACTS_PER_OBJECT: usize = 96;
-/// Other objects that one object touches at once, likewise; usually 24, twice the densest packing's.
-const TOUCHED_PER_OBJECT: usize = 24;
-
-/// Contacts of this frame's updates, collected from wherever interactions left them.
-#[derive(Default)]
-pub(crate) struct Gathered {
-    pub(crate) records: Vec<Contact>,
-    pub(crate) segments: Vec<Segment>,
-    pub(crate) workspace: Workspace,
-}
-
-impl Gathered {
-    /// Makes room for what so many objects like these usually have.
-    pub(crate) fn reserve(&mut self, objects: &[Object], room: usize) {
-        self.records.reserve(room * CONTACTS_PER_OBJECT);
-        self.segments.reserve(room * TOUCHED_PER_OBJECT);
-        self.workspace.reserve(objects, room);
-    }
-
-    pub(crate) fn clear(&mut self) {
-        self.records.clear();
-        self.segments.clear();
-    }
-
-    pub(crate) fn push(&mut self, segment: &[Contact]) {
-        let Some(Contact { object, other, .. }) = segment.first().copied() else { return };
-        let start = self.records.len();
-        self.records.extend_from_slice(segment);
-        self.segments.push(Segment { object, other, start, end: self.records.len() });
+    /// Whether an object is among [`Block::objects`].
+    pub(crate) fn has(&self, id: ObjectId) -> bool {
+        self.objects.binary_search_by_key(&id, Object::id).is_ok()
     }
 }
 

@@ -213,7 +213,6 @@ impl Blocking {
         for &id in ids {
             block.objects.extend(self.objects.get_mut(id as usize).and_then(Option::take));
         }
-        block.gathered.reserve(&block.objects, room);
         block.refresh();
     }
 }

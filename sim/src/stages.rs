@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 
 use glam::Vec3;
 
-use crate::behavior::{Input, Segment, Workspace, batch};
-use crate::block::{Block, Gathered};
+use crate::behavior::{Gathered, Input, Segment, SpringWork, Workspace, batch};
+use crate::block::Block;
 use crate::interaction::{Contact, ContactSink, Rules, Scratch, TableFull};
 use crate::message::Message;
 use crate::object::{Drawing, Fault, FaultKind, Object, ObjectId};
@@ -126,23 +126,25 @@ impl Stages {
 
     /// Updates the objects of a block.
     ///
-    /// The block must have [received] this frame's interaction results. `mail` gives the messages to an
+    /// `workspace` must have [received] this frame's interaction results for the block, and has none
+    /// afterwards. `mail` gives the messages to an
     /// object in the order in which they are to be processed: by sender, then by order of posting.
     /// `post` is given (from, to, message) for each message that an object sends.
     ///
     /// An object whose callback panics, whose state is not finite afterwards, or that is over budget
     /// is quarantined.
     ///
-    /// [received]: Block::receive
+    /// [received]: Workspace::receive
     pub fn update<'m, M: Iterator<Item = &'m Message>>(
         &self,
         frame: u64,
         block: &mut Block,
+        workspace: &mut Workspace,
         mail: impl Fn(ObjectId) -> M,
         post: &mut dyn FnMut(ObjectId, ObjectId, Message),
     ) {
         let began = frame.is_multiple_of(FRAMES_PER_TIMING).then(Instant::now);
-        let Gathered { records, segments, workspace } = &mut block.gathered;
+        let Workspace { gathered: Gathered { records, segments }, springs } = workspace;
         segments.sort_unstable_by_key(|segment| (segment.object, segment.other));
         let mut rest = segments.as_slice();
         for (place, object) in block.objects.iter_mut().enumerate() {
@@ -158,14 +160,15 @@ impl Stages {
                 continue;
             }
             let own_mail = mail(object.id());
-            let given = Given { frame, place, segments, records, workspace: &mut *workspace };
+            let given = Given { frame, place, segments, records, springs: &mut *springs };
             self.update_object(object, given, own_mail, post);
         }
-        batch::advance(&mut block.objects, workspace, self.simd);
-        for waiting in workspace.waiting.drain(..) {
+        batch::advance(&mut block.objects, springs, self.simd);
+        for waiting in springs.waiting.drain(..) {
             block.objects[waiting.place].refresh(frame);
         }
-        block.gathered.clear();
+        records.clear();
+        segments.clear();
         block.refresh();
         if let Some(took) = began.map(|began| began.elapsed()) {
             // Bodies that are advanced together have no time of their own.
@@ -191,7 +194,7 @@ impl Stages {
             object: object.id(),
             segments: given.segments,
             records: given.records,
-            workspace: given.workspace,
+            springs: given.springs,
             post,
         };
         let mut waits = false;
@@ -240,5 +243,5 @@ struct Given<'a> {
     place: usize,
     segments: &'a [Segment],
     records: &'a [Contact],
-    workspace: &'a mut Workspace,
+    springs: &'a mut SpringWork,
 }

@@ -3,13 +3,13 @@
 //! How many bodies are side by side, and which, never shows in the results.
 
 use std::any::Any;
-use std::cell::RefCell;
 use std::cmp::Reverse;
 use std::sync::Arc;
 
-use super::abreast::{AdvanceAbreast, MOST, Nodes, seat};
-use super::spring_kernel::{Advance, Springs};
-use super::{Input, MassSpring, Workspace};
+use super::abreast::{self, AdvanceAbreast, MOST, seat};
+use super::spring_kernel::{self, Advance, Springs};
+use super::workspace::SpringWork;
+use super::{Input, MassSpring};
 use crate::geometry::Mesh;
 use crate::object::Object;
 use crate::simd::{HALF, Simd};
@@ -22,21 +22,9 @@ const WORTH: u64 = 4;
 /// bodies fit a second-level cache of 1 MB.
 const MOST_NODES: usize = 1_024;
 
-thread_local! {
-    /// A thread's, not a block's, so that it is still in the first-level cache at the next block.
-    static NODES: RefCell<Nodes> = RefCell::default();
-}
-
-/// The nodes of the largest of these objects that may be advanced with others.
-pub(crate) fn most_nodes<'o>(objects: impl Iterator<Item = &'o Object>) -> usize {
-    let meshes = objects.filter_map(|object| object.geometry.as_mesh());
-    let nodes = meshes.map(|mesh| mesh.topology().nodes());
-    nodes.filter(|&nodes| nodes <= MOST_NODES).max().unwrap_or(0)
-}
-
-/// Makes room on this thread for bodies of so many nodes, so that its first block need not allocate.
-pub(crate) fn reserve(nodes: usize) {
-    NODES.with_borrow_mut(|own| own.reserve(nodes));
+/// Whether a body of so many nodes may be advanced together with others.
+pub(super) fn may_be_abreast(nodes: usize) -> bool {
+    nodes <= MOST_NODES
 }
 
 /// A body whose springs are left to be advanced.
@@ -61,30 +49,30 @@ impl Waiting {
 pub(crate) fn begin(object: &mut Object, place: usize, input: &mut Input<'_>) -> bool {
     let behavior: &dyn Any = &*object.behavior;
     let Some(behavior) = behavior.downcast_ref::<MassSpring>() else { return false };
-    let fits = |mesh: &&mut Mesh| mesh.is_whole() && mesh.topology().nodes() <= MOST_NODES;
+    let fits = |mesh: &&mut Mesh| mesh.is_whole() && may_be_abreast(mesh.topology().nodes());
     let Some(mesh) = object.geometry.as_mesh_mut().filter(fits) else { return false };
     let springs = behavior.begin(mesh, input);
     let topology = Arc::as_ptr(mesh.topology()).addr();
-    input.workspace.waiting.push(Waiting { place, topology, springs });
+    input.springs.waiting.push(Waiting { place, topology, springs });
     true
 }
 
 /// Advances the springs of all bodies that wait.
-pub(crate) fn advance(objects: &mut [Object], workspace: &mut Workspace, simd: Simd) {
-    let mut waiting = std::mem::take(&mut workspace.waiting);
+pub(crate) fn advance(objects: &mut [Object], work: &mut SpringWork, simd: Simd) {
+    let mut waiting = std::mem::take(&mut work.waiting);
     waiting.sort_unstable_by_key(|body| (body.kind(), Reverse(body.springs.substeps), body.place));
     for mut alike in waiting.chunk_by(|a, b| a.kind() == b.kind()) {
         while let [first, ..] = alike {
             let (now, later) = alike.split_at(together(alike));
             if now.len() > 1 {
-                advance_together(now, objects, simd);
+                advance_together(now, objects, &mut work.abreast, simd);
             } else if let Some(mesh) = objects[first.place].geometry.as_mesh_mut() {
-                advance_alone(mesh, first.springs, workspace, simd);
+                advance_alone(mesh, first.springs, &mut work.alone, simd);
             }
             alike = later;
         }
     }
-    workspace.waiting = waiting;
+    work.waiting = waiting;
 }
 
 /// How many of the first bodies are best advanced together.
@@ -99,7 +87,12 @@ fn together(bodies: &[Waiting]) -> usize {
     if all >= WORTH * longest.unwrap_or(0) { most.len() } else { 1 }
 }
 
-fn advance_together(bodies: &[Waiting], objects: &mut [Object], simd: Simd) {
+fn advance_together(
+    bodies: &[Waiting],
+    objects: &mut [Object],
+    nodes: &mut abreast::Nodes,
+    simd: Simd,
+) {
     let mut seated = [const { [const { None }; HALF] }; 2];
     for (place, object) in objects.iter_mut().enumerate() {
         if let Some(index) = bodies.iter().position(|body| body.place == place)
@@ -109,17 +102,17 @@ fn advance_together(bodies: &[Waiting], objects: &mut [Object], simd: Simd) {
             seated[turn][lane] = Some((mesh.kernel_parts(), bodies[index].springs));
         }
     }
-    NODES.with_borrow_mut(|nodes| simd.run(AdvanceAbreast { bodies: seated, nodes }));
+    simd.run(AdvanceAbreast { bodies: seated, nodes });
 }
 
 /// Advances the springs of one body.
 pub(super) fn advance_alone(
     mesh: &mut Mesh,
     springs: Springs,
-    workspace: &mut Workspace,
+    nodes: &mut spring_kernel::Nodes,
     simd: Simd,
 ) {
     let parts = mesh.kernel_parts();
     let chunks = parts.topology.present().len();
-    simd.for_look_up(chunks).run(Advance { parts, nodes: &mut workspace.alone, springs });
+    simd.for_look_up(chunks).run(Advance { parts, nodes, springs });
 }

@@ -17,6 +17,7 @@ mod spring_kernel;
 mod spring_law;
 pub mod tissue;
 mod tool;
+mod workspace;
 
 use std::any::Any;
 use std::hash::Hasher;
@@ -27,7 +28,7 @@ use self::drill::{Burr, Erosions};
 use crate::geometry::Geometry;
 use crate::interaction::Contact;
 use crate::message::Message;
-use crate::object::{Object, ObjectId};
+use crate::object::ObjectId;
 use crate::simd::Simd;
 
 pub use bone::Bone;
@@ -40,6 +41,8 @@ pub use scripted::{Keyframe, ScriptError, Scripted};
 pub use spring_kernel::Springs;
 pub use tissue::Tissue;
 pub use tool::{Tool, Work, Workpieces};
+pub use workspace::Workspace;
+pub(crate) use workspace::{CONTACTS_PER_OBJECT, Gathered, Room, Segment, SpringWork};
 
 /// How an object changes from frame to frame.
 pub trait Behavior: Any + Send + Sync {
@@ -80,7 +83,7 @@ pub struct Input<'a> {
     pub(crate) object: ObjectId,
     pub(crate) segments: &'a [Segment],
     pub(crate) records: &'a [Contact],
-    pub(crate) workspace: &'a mut Workspace,
+    pub(crate) springs: &'a mut SpringWork,
     pub(crate) post: &'a mut dyn FnMut(ObjectId, ObjectId, Message),
 }
 
@@ -94,32 +97,5 @@ impl Input<'_> {
     /// message to an object that does not exist, or that is quarantined by then, is lost.
     pub fn post(&mut self, to: ObjectId, message: Message) {
         (self.post)(self.object, to, message);
-    }
-}
-
-/// Where an object's contacts with one other lie among the records gathered for a block.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Segment {
-    pub(crate) object: ObjectId,
-    pub(crate) other: ObjectId,
-    pub(crate) start: usize,
-    pub(crate) end: usize,
-}
-
-/// Memory that the updates of a block's objects use.
-#[derive(Debug, Default)]
-pub(crate) struct Workspace {
-    alone: spring_kernel::Nodes,
-    /// Bodies whose springs are left to be advanced.
-    pub(crate) waiting: Vec<batch::Waiting>,
-}
-
-impl Workspace {
-    /// Makes room for these objects, so that no frame need allocate.
-    pub(crate) fn reserve(&mut self, objects: &[Object], room: usize) {
-        self.waiting.reserve(room);
-        let meshes = objects.iter().filter_map(|object| object.geometry.as_mesh());
-        let Some(nodes) = meshes.map(|mesh| mesh.topology().nodes()).max() else { return };
-        self.alone.reserve(nodes);
     }
 }

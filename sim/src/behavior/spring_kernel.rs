@@ -52,7 +52,7 @@ impl Springs {
     /// # Panics
     /// The mesh has fewer positions or velocities than its topology has nodes.
     pub fn advance(self, mesh: &mut Mesh, input: &mut Input<'_>) {
-        batch::advance_alone(mesh, self, input.workspace, input.simd);
+        batch::advance_alone(mesh, self, &mut input.springs.alone, input.simd);
     }
 }
 

@@ -8,6 +8,7 @@ use super::mail::Mail;
 use super::parallel_for::ParallelFor;
 use super::world::{self, Candidates, Outbox, Outcome, World};
 use super::{ExecutorError, MAX_THREADS};
+use crate::behavior::{Room, Workspace};
 use crate::block::Block;
 use crate::blocking::Grain;
 use crate::geometry::Bounds;
@@ -31,14 +32,21 @@ pub(super) struct Engine {
 pub(super) struct Worker {
     pub(super) clock: Clock,
     scratch: Mutex<Scratch>,
-    outbox: Mutex<Outbox>,
+    updating: Mutex<Updating>,
+}
+
+/// What the updates of a thread need.
+pub(super) struct Updating {
+    pub(super) workspace: Workspace,
+    pub(super) outbox: Outbox,
 }
 
 impl Worker {
-    /// What belongs to a thread that may have to update all of so many blocks.
-    pub(super) fn new(blocks: usize) -> Self {
-        let outbox = Mutex::new(world::outbox(blocks));
-        Self { clock: Clock::default(), scratch: Mutex::default(), outbox }
+    /// What belongs to a thread that may have to update all of these blocks.
+    pub(super) fn new(blocks: &[Block]) -> Self {
+        let workspace = Workspace::with_room(Room::of(blocks.iter()));
+        let updating = Mutex::new(Updating { workspace, outbox: world::outbox(blocks.len()) });
+        Self { clock: Clock::default(), scratch: Mutex::default(), updating }
     }
 
     /// What interactions need, and their time.
@@ -47,14 +55,14 @@ impl Worker {
     }
 
     /// What updates need, and their time.
-    pub(super) fn begin_update(&self, frame: u64) -> (Timer<'_>, MutexGuard<'_, Outbox>) {
-        (self.clock.time(Stage::Update, frame), lock(&self.outbox))
+    pub(super) fn begin_update(&self, frame: u64) -> (Timer<'_>, MutexGuard<'_, Updating>) {
+        (self.clock.time(Stage::Update, frame), lock(&self.updating))
     }
 
     /// Moves what was sent to the next frame's mail.
     pub(super) fn collect(workers: &[Self], mail: &mut Mail) {
         for worker in workers {
-            world::empty_into(&mut lock(&worker.outbox), mail);
+            world::empty_into(&mut lock(&worker.updating).outbox, mail);
         }
     }
 }
@@ -78,7 +86,7 @@ impl Engine {
         let world = World::new(scene, grain, threads)?;
         let blocks = world.blocks.len();
         Ok(Self {
-            workers: (0..threads).map(|_| Worker::new(blocks)).collect(),
+            workers: (0..threads).map(|_| Worker::new(&world.blocks)).collect(),
             frame,
             bounds: Vec::with_capacity(blocks),
             found: (0..blocks).map(|_| world::found_list()).collect(),
@@ -149,11 +157,14 @@ impl Engine {
         let (frame, from_outside) = (self.frame, outside.due(self.frame));
         let letters = |object| mail.to(object).chain(from_outside.to(object));
         let begin = |worker: usize| workers[worker].begin_update(frame);
-        loops.for_each(blocks, begin, |(_timer, outbox), index, block| {
+        loops.for_each(blocks, begin, |(_timer, updating), index, block| {
+            let Updating { workspace, outbox } = &mut **updating;
             let outcomes = candidates.of_block(index).map(|place| &outcomes[place]);
-            outcomes.flat_map(Outcome::segments).for_each(|segment| block.receive(segment));
+            outcomes
+                .flat_map(Outcome::segments)
+                .for_each(|segment| workspace.receive(block, segment));
             let mut post = |from, to, message| outbox.push((from, to, message));
-            stages.update(frame, block, letters, &mut post);
+            stages.update(frame, block, workspace, letters, &mut post);
             updated(index, block);
         });
         Worker::collect(&self.workers, mail);

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use super::clock::{Clock, Stage, StageSeconds};
 use super::world::{self, Candidates, Outbox, Outcome, World};
 use super::{Executor, ExecutorError, FrameRecord};
+use crate::behavior::{Room, Workspace};
 use crate::block::Block;
 use crate::blocking::Grain;
 use crate::geometry::Bounds;
@@ -26,6 +27,7 @@ pub struct SerialExecutor {
     outcomes: Vec<Outcome>,
     outbox: Outbox,
     scratch: Scratch,
+    workspace: Workspace,
     clock: Clock,
     running: Duration,
     frame: u64,
@@ -47,6 +49,7 @@ impl SerialExecutor {
             outcomes: (0..world::first_outcomes(blocks)).map(|_| Outcome::new()).collect(),
             outbox: world::outbox(blocks),
             scratch: Scratch::new(),
+            workspace: Workspace::with_room(Room::of(world.blocks.iter())),
             clock: Clock::default(),
             running: Duration::ZERO,
             frame,
@@ -92,9 +95,12 @@ impl SerialExecutor {
         let letters = |object| mail.to(object).chain(from_outside.to(object));
         for (index, block) in blocks.iter_mut().enumerate() {
             let outcomes = self.candidates.of_block(index).map(|place| &self.outcomes[place]);
-            outcomes.flat_map(Outcome::segments).for_each(|segment| block.receive(segment));
+            let workspace = &mut self.workspace;
+            outcomes
+                .flat_map(Outcome::segments)
+                .for_each(|segment| workspace.receive(block, segment));
             let mut post = |from, to, message| self.outbox.push((from, to, message));
-            stages.update(self.frame, block, letters, &mut post);
+            stages.update(self.frame, block, workspace, letters, &mut post);
         }
         world::empty_into(&mut self.outbox, mail);
     }

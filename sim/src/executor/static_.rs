@@ -13,6 +13,7 @@ use super::mail::Mail;
 use super::outside::Outside;
 use super::world::{self, Candidates, Outbox, Outcome, Partners, World};
 use super::{Executor, ExecutorError, FrameRecord};
+use crate::behavior::{Room, Workspace};
 use crate::block::Block;
 use crate::blocking::{Blocking, Grain};
 use crate::geometry::Bounds;
@@ -30,7 +31,7 @@ pub struct StaticExecutor {
     team: Team,
     shared: Arc<Shared>,
     blocking: Blocking,
-    scratch: Scratch,
+    own: Own,
     grain: Grain,
     running: Duration,
     frame: u64,
@@ -47,6 +48,13 @@ struct Shared {
     frame: AtomicU64,
     stop: AtomicBool,
     outside: Arc<Outside>,
+    room: Room,
+}
+
+/// What each thread has for itself.
+struct Own {
+    scratch: Scratch,
+    workspace: Workspace,
 }
 
 /// All threads but the calling one.
@@ -84,6 +92,7 @@ impl StaticExecutor {
             outcomes: (0..world::first_outcomes(count)).map(outcome).collect(),
             mail: world.mail,
         };
+        let room = Room::of(world.blocks.iter());
         let shared = Arc::new(Shared {
             blocks: world.blocks.into_iter().map(RwLock::new).collect(),
             found: (0..count).map(|_| Mutex::new(world::found_list())).collect(),
@@ -94,10 +103,11 @@ impl StaticExecutor {
             frame: AtomicU64::new(0),
             stop: AtomicBool::new(false),
             outside: world.outside,
+            room,
         });
         let team = Team { threads: start(&shared, threads)?, shared: Arc::clone(&shared) };
         let (blocking, running) = (world.blocking, Duration::ZERO);
-        Ok(Self { team, shared, blocking, scratch: Scratch::new(), grain, running, frame })
+        Ok(Self { team, shared, blocking, own: Own::new(room), grain, running, frame })
     }
 
     /// Forms the blocks anew.
@@ -152,30 +162,36 @@ fn start(shared: &Arc<Shared>, threads: usize) -> Result<Vec<JoinHandle<()>>, Ex
     Ok(started)
 }
 
+impl Own {
+    fn new(room: Room) -> Self {
+        Self { scratch: Scratch::new(), workspace: Workspace::with_room(room) }
+    }
+}
+
 impl Shared {
     /// A thread's life: frames until it is told to stop.
     fn work(&self, worker: usize) {
-        let mut scratch = Scratch::new();
+        let mut own = Own::new(self.room);
         loop {
             self.barrier.wait();
             if self.stop.load(Ordering::Relaxed) {
                 return;
             }
-            self.compute(worker, &mut scratch);
+            self.compute(worker, &mut own);
         }
     }
 
     /// One thread's share of a frame.
-    fn compute(&self, worker: usize, scratch: &mut Scratch) {
+    fn compute(&self, worker: usize, own: &mut Own) {
         self.broad_phase(worker);
         self.barrier.wait();
         if worker == 0 {
             self.collect();
         }
         self.barrier.wait();
-        self.interact(worker, scratch);
+        self.interact(worker, &mut own.scratch);
         self.barrier.wait();
-        self.update(worker);
+        self.update(worker, &mut own.workspace);
         self.barrier.wait();
     }
 
@@ -217,7 +233,7 @@ impl Shared {
         }
     }
 
-    fn update(&self, worker: usize) {
+    fn update(&self, worker: usize, workspace: &mut Workspace) {
         let _timer = self.time(worker, Stage::Update);
         let frame = self.frame.load(Ordering::Relaxed);
         let plan = read(&self.plan);
@@ -228,9 +244,10 @@ impl Shared {
             let mut post = |from, to, message| outbox.push((from, to, message));
             let mut block = write(&self.blocks[index]);
             for place in plan.candidates.of_block(index) {
-                read(&plan.outcomes[place]).segments().for_each(|segment| block.receive(segment));
+                let outcome = read(&plan.outcomes[place]);
+                outcome.segments().for_each(|segment| workspace.receive(&block, segment));
             }
-            plan.stages.update(frame, &mut block, letters, &mut post);
+            plan.stages.update(frame, &mut block, workspace, letters, &mut post);
         }
     }
 
@@ -271,7 +288,7 @@ impl Executor for StaticExecutor {
         for _ in 0..frames {
             self.prepare();
             self.shared.barrier.wait();
-            self.shared.compute(0, &mut self.scratch);
+            self.shared.compute(0, &mut self.own);
             let pairs = self.shared.finish();
             self.render(renderer);
             on_frame(&FrameRecord { frame: self.frame, swapped: Instant::now(), pairs });

@@ -40,9 +40,18 @@ pub struct Mesh {
     pub positions: Vectors,
     /// The nodes' velocities, in metres per second.
     pub velocities: Vectors,
-    masses: Vec<Lanes>,
-    inverse_masses: Vec<Lanes>,
+    /// Bodies of one make share them: a third less to be brought into the caches for each.
+    masses: Arc<Masses>,
     contact_radius: f32,
+}
+
+/// The nodes' masses, which never change.
+#[derive(Debug, PartialEq)]
+struct Masses {
+    /// In kilograms.
+    masses: Vec<Lanes>,
+    /// In 1/kg.
+    inverse: Vec<Lanes>,
 }
 
 impl Mesh {
@@ -62,24 +71,38 @@ impl Mesh {
         contact_radius: f32,
     ) -> Result<Self, MeshError> {
         let nodes = topology.nodes();
-        for (what, given) in [("positions", positions.len()), ("masses", masses.len())] {
-            if given != nodes {
-                return Err(MeshError::Length { what, given, nodes });
-            }
-        }
+        check_length("masses", masses.len(), nodes)?;
         let wrong = |&(_, &mass): &(usize, &f32)| !(mass >= 0.0 && mass.is_finite());
         if let Some((node, &mass)) = masses.iter().enumerate().find(wrong) {
             return Err(MeshError::Mass { node, mass });
         }
         let inverse = |&mass: &f32| if mass > 0.0 { 1.0 / mass } else { 0.0 };
-        Ok(Self {
-            positions: Vectors::from_slice(positions),
-            velocities: Vectors::zeros(nodes),
-            inverse_masses: in_lanes(masses.iter().map(inverse), nodes),
+        let masses = Masses {
+            inverse: in_lanes(masses.iter().map(inverse), nodes),
             masses: in_lanes(masses.iter().copied(), nodes),
-            topology,
-            contact_radius,
-        })
+        };
+        Self::at_rest(topology, Arc::new(masses), positions, contact_radius)
+    }
+
+    /// Another surface of the same make, at rest, with its nodes at `positions`, in metres.
+    ///
+    /// # Errors
+    /// A list of another length than the number of nodes.
+    pub fn another(&self, positions: &[Vec3]) -> Result<Self, MeshError> {
+        let (topology, masses) = (Arc::clone(&self.topology), Arc::clone(&self.masses));
+        Self::at_rest(topology, masses, positions, self.contact_radius)
+    }
+
+    fn at_rest(
+        topology: Arc<Topology>,
+        masses: Arc<Masses>,
+        positions: &[Vec3],
+        contact_radius: f32,
+    ) -> Result<Self, MeshError> {
+        let nodes = topology.nodes();
+        check_length("positions", positions.len(), nodes)?;
+        let (positions, velocities) = (Vectors::from_slice(positions), Vectors::zeros(nodes));
+        Ok(Self { topology, positions, velocities, masses, contact_radius })
     }
 
     /// What the nodes are joined by.
@@ -91,12 +114,12 @@ impl Mesh {
     /// The nodes' masses, in kilograms; 0 for a node that is held fast.
     #[must_use]
     pub fn masses(&self) -> &[f32] {
-        &self.masses.as_flattened()[..self.topology.nodes()]
+        &self.masses.masses.as_flattened()[..self.topology.nodes()]
     }
 
     /// The nodes' inverse masses, in 1/kg; 0 for a node that is held fast.
     pub(crate) fn inverse_masses(&self) -> &[f32] {
-        &self.inverse_masses.as_flattened()[..self.topology.nodes()]
+        &self.masses.inverse.as_flattened()[..self.topology.nodes()]
     }
 
     /// The radius of each node's contact sphere, in metres.
@@ -115,7 +138,7 @@ impl Mesh {
     /// Changes a node's velocity by an impulse, in newton seconds; a node past the last is ignored.
     pub fn apply_impulse(&mut self, node: u32, impulse: Vec3) {
         let node = node as usize;
-        if let Some(&inverse_mass) = self.inverse_masses.as_flattened().get(node) {
+        if let Some(&inverse_mass) = self.masses.inverse.as_flattened().get(node) {
             self.velocities.add(node, impulse * inverse_mass);
         }
     }
@@ -124,7 +147,7 @@ impl Mesh {
     pub fn apply_body_impulse(&mut self, impulse: Vec3) {
         let share = (impulse / self.topology.nodes().max(1) as f32).to_array();
         for (component, share) in self.velocities.components.iter_mut().zip(share) {
-            for (velocities, inverse_masses) in component.iter_mut().zip(&self.inverse_masses) {
+            for (velocities, inverse_masses) in component.iter_mut().zip(&self.masses.inverse) {
                 for (velocity, inverse_mass) in velocities.iter_mut().zip(inverse_masses) {
                     *velocity += share * inverse_mass;
                 }
@@ -135,7 +158,7 @@ impl Mesh {
     /// Multiplies the velocities of all nodes that are not held fast.
     pub(crate) fn damp(&mut self, factor: f32) {
         for component in &mut self.velocities.components {
-            for (velocities, masses) in component.iter_mut().zip(&self.masses) {
+            for (velocities, masses) in component.iter_mut().zip(&self.masses.masses) {
                 for (velocity, &mass) in velocities.iter_mut().zip(masses) {
                     *velocity *= if mass > 0.0 { factor } else { 1.0 };
                 }
@@ -174,9 +197,10 @@ impl Mesh {
             self.clone_from(other);
             return;
         }
-        // Bodies of one make may still differ in mass.
-        self.masses.clone_from(&other.masses);
-        self.inverse_masses.clone_from(&other.inverse_masses);
+        // Bodies of one topology may still differ in mass.
+        if !Arc::ptr_eq(&self.masses, &other.masses) {
+            self.masses.clone_from(&other.masses);
+        }
         self.contact_radius = other.contact_radius;
         self.positions.copy_from(&other.positions);
         self.velocities.copy_from(&other.velocities);
@@ -188,10 +212,14 @@ impl Mesh {
             topology: &self.topology,
             positions: &mut self.positions,
             velocities: &mut self.velocities,
-            masses: &self.masses,
-            inverse_masses: &self.inverse_masses,
+            masses: &self.masses.masses,
+            inverse_masses: &self.masses.inverse,
         }
     }
+}
+
+fn check_length(what: &'static str, given: usize, nodes: usize) -> Result<(), MeshError> {
+    if given == nodes { Ok(()) } else { Err(MeshError::Length { what, given, nodes }) }
 }
 
 /// A mesh, taken apart for a kernel.

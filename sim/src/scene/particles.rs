@@ -166,12 +166,12 @@ impl ParticleScene {
         let (nodes, triangles) = icosphere(RADIUS);
         let edges = edges(&triangles);
         let topology = Arc::new(Topology::new(&nodes, triangles, &edges, true)?);
+        let make = Mesh::new(topology, &nodes, &[NODE_MASS; ICOSPHERE_NODES], CONTACT_RADIUS)?;
         let mut random = SplitMix64::new(self.seed);
         let mut objects = Vec::with_capacity(centers.len() + 6);
         for (index, &center) in centers.iter().enumerate() {
             let positions: Vec<Vec3> = nodes.iter().map(|&node| center + node).collect();
-            let masses = [NODE_MASS; ICOSPHERE_NODES];
-            let mut mesh = Mesh::new(Arc::clone(&topology), &positions, &masses, CONTACT_RADIUS)?;
+            let mut mesh = make.another(&positions)?;
             let mut component = || random.symmetric();
             mesh.set_velocity(Vec3::new(component(), component(), component()) * SPEED);
             let substeps = random.up_to(self.most_substeps);

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use dualframe_sim::behavior::{Behavior, Input, MassSpring};
+use dualframe_sim::behavior::{Behavior, Input, MassSpring, Workspace};
 use dualframe_sim::block::Block;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::{
@@ -122,10 +122,12 @@ impl Reference {
             }
             count += self.stages.interact_within(a, &mut scratch, &mut buffer).expect("grows");
         }
+        let mut workspace = Workspace::default();
         let segments: Vec<_> = buffer.segments().collect();
         for block in &mut self.blocks {
-            segments.iter().rev().for_each(|segment| block.receive(segment));
-            self.stages.update(self.frame, block, |_| std::iter::empty(), &mut |_, _, _| {});
+            segments.iter().rev().for_each(|segment| workspace.receive(block, segment));
+            let nobody = |_| std::iter::empty();
+            self.stages.update(self.frame, block, &mut workspace, nobody, &mut |_, _, _| {});
         }
         self.frame += 1;
         count

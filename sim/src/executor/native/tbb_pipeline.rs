@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use send_wrapper::SendWrapper;
 
 use super::super::clock::{Stage, StageSeconds};
-use super::super::engine::{Worker, check_threads};
+use super::super::engine::{Updating, Worker, check_threads};
 use super::super::parallel_for::ParallelFor;
 use super::super::world::{self, Candidates, Outcome, World};
 use super::super::{Executor, ExecutorError, FrameRecord};
@@ -63,7 +63,7 @@ impl TbbPipelineExecutor {
         let blocks = world.blocks.len();
         Ok(Self {
             arena: Tbb::new(threads)?,
-            workers: (0..threads).map(|_| Worker::new(blocks)).collect(),
+            workers: (0..threads).map(|_| Worker::new(&world.blocks)).collect(),
             bounds: Vec::with_capacity(blocks),
             searches: (0..blocks).map(|_| Search::new()).collect(),
             candidates: Candidates::new(blocks),
@@ -112,11 +112,12 @@ impl TbbPipelineExecutor {
             &searches[first].outcomes[place - first_places[first]]
         };
         let work = |worker: usize, index: usize, block: &mut Block| {
-            let (_timer, mut outbox) = workers[worker].begin_update(*frame);
+            let (_timer, mut updating) = workers[worker].begin_update(*frame);
+            let Updating { workspace, outbox } = &mut *updating;
             let segments = candidates.of_block(index).map(outcome).flat_map(Outcome::segments);
-            segments.for_each(|segment| block.receive(segment));
+            segments.for_each(|segment| workspace.receive(block, segment));
             let mut post = |from, to, message| outbox.push((from, to, message));
-            stages.update(*frame, block, letters, &mut post);
+            stages.update(*frame, block, workspace, letters, &mut post);
         };
         let mut waiting: Vec<&Block> = Vec::with_capacity(blocks.len());
         let mut screen = SendWrapper::new(renderer);

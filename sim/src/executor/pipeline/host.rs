@@ -11,7 +11,7 @@ use dualframe_core::frame::Frame;
 use dualframe_core::inputs::Inputs;
 use dualframe_core::unit::UnitId;
 
-use crate::behavior::batch;
+use crate::behavior::{Room, Workspace};
 use crate::block::Block;
 use crate::executor::FrameRecord;
 use crate::executor::outside::Outside;
@@ -28,8 +28,8 @@ pub(super) struct Shared<'s> {
     outside: &'s Outside,
     /// The number of the pipeline's frame 0.
     pub(super) first_frame: u64,
-    /// The most nodes of a body that workers make room for.
-    nodes: usize,
+    /// What each worker makes room for.
+    room: Room,
     /// The unit that each object is in. Changed only between runs.
     unit_of: Vec<AtomicU32>,
 }
@@ -43,7 +43,7 @@ impl<'s> Shared<'s> {
     ) -> Self {
         let objects = || blocks.iter().flat_map(Block::objects);
         let unit_of = objects().map(|_| AtomicU32::new(0)).collect();
-        Self { stages, outside, first_frame, nodes: batch::most_nodes(objects()), unit_of }
+        Self { stages, outside, first_frame, room: Room::of(blocks.iter()), unit_of }
     }
 
     /// Notes that the objects of `block` are in unit `unit`.
@@ -91,15 +91,17 @@ pub(super) struct Parcel {
 pub(super) struct Host<'s> {
     shared: &'s Shared<'s>,
     scratch: RefCell<Scratch>,
+    workspace: RefCell<Workspace>,
     results: RefCell<ContactBuffer>,
     letters: RefCell<Vec<Parcel>>,
 }
 
 impl<'s> Host<'s> {
     pub(super) fn new(shared: &'s Shared<'s>) -> Self {
-        batch::reserve(shared.nodes);
         let results = RefCell::new(ContactBuffer::with_capacity(RECORDS_PER_CANDIDATE));
-        Self { shared, scratch: RefCell::default(), results, letters: RefCell::default() }
+        let workspace = RefCell::new(Workspace::with_room(shared.room));
+        let (scratch, letters) = (RefCell::default(), RefCell::default());
+        Self { shared, scratch, workspace, results, letters }
     }
 }
 
@@ -168,6 +170,7 @@ impl<'s> Environment for Host<'s> {
             let own = letters.iter().filter(move |parcel| parcel.to == object);
             own.map(|parcel| &parcel.message).chain(from_outside.to(object))
         };
+        let workspace = &mut *self.workspace.borrow_mut();
         let Unit { block, pairs } = unit;
         *pairs = PairCount::default();
         // The block brings them into its objects' order itself.
@@ -175,7 +178,7 @@ impl<'s> Environment for Host<'s> {
             if interaction.other >= id {
                 *pairs += *interaction.state;
             }
-            interaction.contacts.for_each(|segment| block.receive(segment));
+            interaction.contacts.for_each(|segment| workspace.receive(block, segment));
         }
         let mut outcome = Ok(());
         let mut post = |from: ObjectId, to: ObjectId, message| {
@@ -185,7 +188,7 @@ impl<'s> Environment for Host<'s> {
                 outcome = Err(rejected.full);
             }
         };
-        shared.stages.update(number, block, mail, &mut post);
+        shared.stages.update(number, block, workspace, mail, &mut post);
         outcome
     }
 

@@ -8,7 +8,8 @@ use dualframe_core::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
 use dualframe_core::unit::UnitId;
 
 use super::host::{Parcel, Unit};
-use crate::block::{Block, CONTACTS_PER_OBJECT};
+use crate::behavior::CONTACTS_PER_OBJECT;
+use crate::block::Block;
 use crate::interaction::Contact;
 use crate::object::Object;
 use crate::stages::{PairCount, Stages};

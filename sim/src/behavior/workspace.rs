@@ -1,0 +1,100 @@
+//! What updates need and leave nothing in.
+
+use super::{abreast, batch, spring_kernel};
+use crate::block::Block;
+use crate::interaction::Contact;
+use crate::object::ObjectId;
+
+/// Contact records of one object in one frame for which there is room from the start; usually 96, twice
+/// what the densest pile has, so that a frame need not allocate.
+pub(crate) const CONTACTS_PER_OBJECT: usize = 96;
+/// Other objects that one object touches at once, likewise; usually 24, twice the densest packing's.
+const TOUCHED_PER_OBJECT: usize = 24;
+
+/// Memory that updates use. It belongs to a thread, not to a block, so that it is still in the thread's
+/// caches when the next block comes.
+#[derive(Debug, Default)]
+pub struct Workspace {
+    pub(crate) gathered: Gathered,
+    pub(crate) springs: SpringWork,
+}
+
+/// Contacts of this frame for the block to be updated, collected from wherever interactions left them.
+#[derive(Debug, Default)]
+pub(crate) struct Gathered {
+    pub(crate) records: Vec<Contact>,
+    pub(crate) segments: Vec<Segment>,
+}
+
+/// Where an object's contacts with one other lie among the records gathered for a block.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Segment {
+    pub(crate) object: ObjectId,
+    pub(crate) other: ObjectId,
+    pub(crate) start: usize,
+    pub(crate) end: usize,
+}
+
+/// What springs are advanced in.
+#[derive(Debug, Default)]
+pub(crate) struct SpringWork {
+    pub(super) alone: spring_kernel::Nodes,
+    pub(super) abreast: abreast::Nodes,
+    /// Bodies whose springs are left to be advanced.
+    pub(crate) waiting: Vec<batch::Waiting>,
+}
+
+/// How much room the updates of some blocks need.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Room {
+    objects: usize,
+    /// Nodes of a body.
+    nodes: usize,
+    /// Nodes of a body that may be advanced beside others.
+    abreast: usize,
+}
+
+impl Room {
+    /// What these blocks need, now and when their objects are dealt out anew.
+    pub(crate) fn of<'b>(blocks: impl Iterator<Item = &'b Block>) -> Self {
+        let mut room = Self { objects: 0, nodes: 0, abreast: 0 };
+        for block in blocks {
+            room.objects = room.objects.max(block.objects.capacity());
+            let meshes = block.objects.iter().filter_map(|object| object.geometry.as_mesh());
+            for nodes in meshes.map(|mesh| mesh.topology().nodes()) {
+                room.nodes = room.nodes.max(nodes);
+                if batch::may_be_abreast(nodes) {
+                    room.abreast = room.abreast.max(nodes);
+                }
+            }
+        }
+        room
+    }
+}
+
+impl Workspace {
+    /// Memory that usually need not grow.
+    pub(crate) fn with_room(room: Room) -> Self {
+        let mut workspace = Self::default();
+        let Self { gathered: Gathered { records, segments }, springs } = &mut workspace;
+        records.reserve(room.objects * CONTACTS_PER_OBJECT);
+        segments.reserve(room.objects * TOUCHED_PER_OBJECT);
+        springs.waiting.reserve(room.objects);
+        springs.alone.reserve(room.nodes);
+        springs.abreast.reserve(room.abreast);
+        workspace
+    }
+
+    /// Takes over a segment of this frame's interaction results. Before a block is updated all must have
+    /// been taken over that concern its objects, in any order, and none of another block; a segment for
+    /// none of its objects is ignored.
+    pub fn receive(&mut self, block: &Block, segment: &[Contact]) {
+        let Some(&Contact { object, other, .. }) = segment.first() else { return };
+        if block.has(object) {
+            let Gathered { records, segments } = &mut self.gathered;
+            let start = records.len();
+            records.extend_from_slice(segment);
+            segments.push(Segment { object, other, start, end: records.len() });
+        }
+    }
+}
