@@ -4,6 +4,7 @@ mod common;
 
 use std::collections::HashSet;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -170,18 +171,26 @@ fn limits() {
 #[test]
 fn readers_see_whole_spans_in_order() {
     const KEPT: usize = 500;
+    const READS: usize = 20_000;
+    /// Far more than are written during the reads, unless the two threads never run at the same time.
+    const MOST: u32 = 400_000_000;
     let timeline = Timeline::new(1, KEPT);
     let start = Instant::now();
-    let (mut cut_short, mut offset) = (0, None);
+    let (mut reads, mut was_full, mut cut_short, mut offset) = (0, false, 0, None);
+    let is_read = AtomicBool::new(false);
     thread::scope(|scope| {
-        let writer =
-            scope.spawn(|| (0..10_000_000).for_each(|frame| record(&timeline, start, frame)));
+        let writer = scope.spawn(|| {
+            let going = |_: &u32| !is_read.load(Ordering::Relaxed);
+            (0..MOST).take_while(going).for_each(|frame| record(&timeline, start, frame));
+        });
         let mut spans = Vec::with_capacity(KEPT);
-        while !writer.is_finished() {
+        while (reads < READS || cut_short == 0) && !writer.is_finished() {
             spans.clear();
+            reads += 1;
             timeline.copy_since(0, Duration::ZERO, &mut spans);
-            let Some(last) = spans.last().map(Span::frame) else { continue };
-            cut_short += usize::from(spans.len() < KEPT && last >= KEPT as u64);
+            // Once it has been full it stays so: what is missing then was overwritten.
+            was_full |= spans.len() == KEPT;
+            cut_short += usize::from(was_full && spans.len() < KEPT);
             for span in &spans {
                 let frame = span.frame() as u32;
                 assert_eq!(span.stage(), stage_of(span.frame()));
@@ -191,6 +200,7 @@ fn readers_see_whole_spans_in_order() {
             }
             assert!(spans.is_sorted_by(|a, b| a.frame() + 1 == b.frame()), "a frame is missing");
         }
+        is_read.store(true, Ordering::Relaxed);
     });
     assert!(cut_short > 0, "nothing was overwritten while it was read");
 }
