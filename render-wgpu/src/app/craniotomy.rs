@@ -10,7 +10,8 @@ use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_sim::behavior::Bone;
 use dualframe_sim::blocking::Grain;
-use dualframe_sim::device::link::{SimulationEnd, ToolState};
+use dualframe_sim::device::link::{HapticLink, SimulationEnd, ToolState};
+use dualframe_sim::device::motion::Motion;
 use dualframe_sim::executor::FrameRecord;
 use dualframe_sim::geometry::{Bounds, Volume};
 use dualframe_sim::image;
@@ -28,6 +29,7 @@ use super::args::CraniotomyArgs;
 use super::haptics::{Cells, Each, Loops};
 use super::manage::{Manage, manage};
 use super::measure::Measure;
+use super::operator::Operator;
 use super::outputs::{self, Outputs};
 use super::particles::{RunError, SHOWN_SPANS, TRACED_SPANS, progress_bar};
 use super::pictures::Pictures;
@@ -49,17 +51,18 @@ pub(super) fn run(
 ) -> Result<Report, RunError> {
     let scene = patient.build(args.way.simd())?;
     let places = TOOLS.map(|tool| scene.objects[tool.0 as usize].center());
-    let cells = &mut Cells::new(places);
+    let (cells, links) = (&mut Cells::new(places), &mut Each::<HapticLink>::default());
     // Haptic loops end with it.
     thread::scope(|scope| {
         let what = (args, patient, outputs);
-        run_beside(|| Ok(cells.start(scope, args.haptic_rate)?), scene, what, count, note)
+        run_beside(|| Ok(cells.start(scope, args.haptic_rate)?), links, scene, what, count, note)
     })
 }
 
-/// Operates on a scene beside haptic loops, which `start` starts where a person operates.
+/// Operates on a scene beside haptic loops: a person beside those that `start` starts, a script over `links`.
 fn run_beside<'c>(
     start: impl FnOnce() -> Result<Loops<'c, 'c>, RunError>,
+    links: &'c mut Each<HapticLink>,
     scene: Scene,
     (args, patient, outputs): (&CraniotomyArgs, &Patient, &Outputs),
     count: AllocationCounter<'_>,
@@ -73,7 +76,10 @@ fn run_beside<'c>(
     let timeline = Arc::new(Timeline::new(workers, spans));
     let at_hand = || Ok(CraniotomyAtHand::begin(args, patient, start()?));
     let how = (&args.way, &args.products);
-    let window = Session::open(at_hand, how, TIME_STEP, &timeline, note)?;
+    let window = match args.simulated_devices {
+        true => None,
+        false => Session::open(at_hand, how, TIME_STEP, &timeline, note)?,
+    };
     let is_watched = window.is_some() || is_traced;
     let manage = |scene| manage(scene, settings, is_watched.then_some(&timeline));
     let manager = manage(scene)?;
@@ -88,7 +94,10 @@ fn run_beside<'c>(
                 window.run(manager, recording, args.frames, picture, on_frame)?;
             (manager, at_hand.surgery, measure)
         }
-        None => run_unwatched(args, patient, outputs, (manager, recording, &manage), count)?,
+        None => {
+            let how = (manager, recording, &manage as Manage<'_>);
+            run_unwatched(args, patient, outputs, links, how, count)?
+        }
     };
     if let Some(file) = &outputs.trace {
         let write = |writer: &mut BufWriter<&File>| timeline.write_chrome_trace(writer);
@@ -106,10 +115,14 @@ fn run_unwatched<'c, 'h>(
     args: &CraniotomyArgs,
     patient: &Patient,
     outputs: &Outputs,
+    links: &'h mut Each<HapticLink>,
     (mut manager, mut recording, manage): (VeManager, Recording<'_>, Manage<'_>),
     count: AllocationCounter<'c>,
 ) -> Result<(VeManager, Surgery<'h>, Measure<'c>), RunError> {
     let mut surgery = Surgery::new(patient, Some(args.step.unwrap_or(Step::All)));
+    if args.simulated_devices {
+        surgery.operator = Some(Operator::new(links, &mut surgery, args.haptic_rate)?);
+    }
     let frames = args.frames.unwrap_or_else(|| surgery.frames());
     let look = |quality| look(surgery.region(), quality);
     let mut pictures = Pictures::new(&args.products, frames, look)?;
@@ -147,6 +160,8 @@ pub(super) struct Surgery<'c> {
     step: Option<Step>,
     /// Pieces of bone that came free.
     pieces: usize,
+    /// Who moves devices as the script says, if they are simulated.
+    operator: Option<Operator<'c>>,
     /// What the hands' haptic loops last said, where some are linked.
     pub(super) devices: Each<Option<ToolState>>,
 }
@@ -154,12 +169,17 @@ pub(super) struct Surgery<'c> {
 impl<'c> Surgery<'c> {
     pub(super) fn new(patient: &Patient, step: Option<Step>) -> Self {
         let operation = Operation::new(Arc::clone(&patient.head), step);
-        Self { operation, step, pieces: 0, devices: Default::default() }
+        Self { operation, step, pieces: 0, operator: None, devices: Default::default() }
     }
 
-    /// From now on the hands are where their devices are.
-    pub(super) fn link(&mut self, ends: Each<SimulationEnd<'c>>) {
-        (0..).zip(ends).for_each(|(hand, end)| self.operation.link(hand, end));
+    /// From now on a hand is where its device is.
+    pub(super) fn link(&mut self, hand: usize, end: SimulationEnd<'c>) {
+        self.operation.link(hand, end);
+    }
+
+    /// What a hand does by the script; none for one that does nothing.
+    pub(super) fn motion(&self, hand: usize) -> Option<Motion> {
+        self.operation.motion(hand)
     }
 
     /// The ends of the loops that the hands were linked with.
@@ -195,6 +215,7 @@ impl<'c> Surgery<'c> {
         let (hands, mut watch) = self.operation.parts(renderer);
         let mailbox = manager.mailbox();
         let mut on_frame = |record: &FrameRecord| {
+            self.operator.iter_mut().for_each(|operator| operator.follow(record.frame));
             hands.swapped(record.frame, &mailbox);
             on_frame(record);
         };

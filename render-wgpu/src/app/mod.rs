@@ -6,6 +6,7 @@ mod experiment;
 mod haptics;
 mod manage;
 mod measure;
+mod operator;
 mod outputs;
 mod particles;
 mod pictures;
@@ -17,6 +18,8 @@ mod window;
 
 use std::error::Error;
 use std::process::ExitCode;
+
+use dualframe_sim::device::thread::LoopError;
 
 use self::args::{CraniotomyArgs, ExperimentArgs, Outcome, Particles, ReplayArgs};
 use self::outputs::Outputs;
@@ -109,6 +112,9 @@ fn operate(args: &CraniotomyArgs, allocations: AllocationCounter<'_>) -> ExitCod
     match craniotomy::run(args, &patient, &outputs, allocations, &note) {
         Ok(report) => tell(&report, &outputs),
         Err(RunError::Graphics(error)) => fail(&with_causes(&error), NO_PICTURE),
+        Err(RunError::Haptics(error @ LoopError::Rate { .. })) => {
+            fail(&with_causes(&error), BAD_ARGUMENT)
+        }
         Err(error) => fail(&with_causes(&error), UNSOUND),
     }
 }

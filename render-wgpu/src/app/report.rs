@@ -54,7 +54,7 @@ pub(super) struct OperationReport {
     /// Bone that was drilled away, in cubic millimetres of full bone.
     pub(super) bone_removed_mm3: f64,
     pub(super) score: ScoreReport,
-    /// Of the hands' haptic loops, where a person operated.
+    /// Of the hands' haptic loops, where there were some.
     pub(super) haptics: Vec<HapticsReport>,
 }
 

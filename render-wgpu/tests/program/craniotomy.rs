@@ -32,6 +32,33 @@ fn an_operation_is_reported_recorded_and_saved() {
     }
 }
 
+/// Simulated hands cut the scalp, which holds them back, to the same bits whoever computes.
+#[test]
+fn simulated_hands_operate() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let json = folder.path().join("report.json");
+    let operate = |way: [&str; 4]| {
+        let args = ["craniotomy", "--simulated-devices", "--step", "incision", "--frames", "130"];
+        let json = ["--json", json.to_str().expect("a plain path")];
+        let output = run(&[&args[..], &way, &json].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        read_json(json[1].as_ref())
+    };
+    let report = operate(["--executor", "pipeline", "--threads", "2"]);
+    let other = operate(["--executor", "rayon-overlapped", "--threads", "2"]);
+    for key in ["state_hash", "haptics"] {
+        assert_eq!(report[key], other[key], "{key}");
+    }
+    let [cutting, other] = [0, 1].map(|hand| &report["haptics"][hand]);
+    assert_eq!((&cutting["ticks"], &other["ticks"]), (&2_166.into(), &2_166.into()));
+    assert!(cutting["absorbed_j"].as_f64() > Some(0.001), "{cutting}");
+    let refused = |args: &[&str], expected: &str| {
+        told(&run(&[&["craniotomy", "--simulated-devices"], args].concat()), 2, expected);
+    };
+    refused(&["--window"], "--window");
+    refused(&["--haptic-rate", "100"], "500 to 4000 Hz");
+}
+
 #[test]
 fn what_is_no_head_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");

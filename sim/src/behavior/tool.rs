@@ -86,6 +86,7 @@ impl Work {
 /// button presses a blade or an elevator, closes forceps and starts a drill. A drill does not follow into bone:
 /// it goes there as fast as it takes the bone away ([`Feed`]). What it does to others it posts to them, so that
 /// it happens in their own next update.
+#[derive(Clone)]
 pub struct Tool {
     instrument: Instrument,
     device: DeviceSample,
@@ -346,6 +347,14 @@ impl Behavior for Tool {
         let axis = axis(pose.rotation);
         let center = pose.translation + axis * bit.radius;
         Some(Burr { bit, center, axis, spin: self.spin, side: self.reaction.normal() })
+    }
+
+    fn show_in(&self, snapshot: &mut Box<dyn Behavior>) {
+        let shown: &mut dyn Any = &mut **snapshot;
+        match shown.downcast_mut::<Self>() {
+            Some(shown) => shown.clone_from(self),
+            None => *snapshot = Box::new(self.clone()),
+        }
     }
 
     fn hash_state(&self, hasher: &mut dyn Hasher) {

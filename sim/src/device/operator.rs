@@ -21,13 +21,23 @@ pub struct Hand {
     pub damping: f64,
     /// In newtons per metre. Usually 50 (a light grip) to 500.
     pub stiffness: f64,
+    /// How fast the hand makes up, by eye, for being elsewhere than it wants to be: the share of the way a
+    /// second. Usually 0 (without looking) to 3: what the eye sees moves the hand some 0.2 s later (R. C.
+    /// Miall et al., "Is the cerebellum a Smith predictor?", J. Motor Behavior 1993).
+    pub correction: f64,
 }
+
+/// How far from where it wants to be a hand aims at most, to make up for what holds it back, in metres; usually
+/// 10 mm: 5 N in a firm grip.
+const MOST_CORRECTION: f64 = 0.01;
 
 impl Hand {
     /// A light grip, the hardest case for stability: little damping.
-    pub const LIGHT: Self = Self { mass: 0.0, damping: 0.0, stiffness: 50.0 };
+    pub const LIGHT: Self = Self { mass: 0.0, damping: 0.0, stiffness: 50.0, correction: 0.0 };
     /// A firm grip.
-    pub const FIRM: Self = Self { mass: 0.15, damping: 5.0, stiffness: 500.0 };
+    pub const FIRM: Self = Self { mass: 0.15, damping: 5.0, stiffness: 500.0, correction: 0.0 };
+    /// A firm grip of somebody who looks.
+    pub const GUIDED: Self = Self { correction: 2.0, ..Self::FIRM };
 }
 
 /// A desktop device with three actuated axes in the hand of an operator.
@@ -42,6 +52,8 @@ pub struct SimulatedDevice {
     position: DVec3,
     velocity: DVec3,
     force: DVec3,
+    /// By how much the hand aims beside where it wants to be, in metres.
+    aside: DVec3,
     time: f64,
 }
 
@@ -66,8 +78,8 @@ impl SimulatedDevice {
     #[must_use]
     pub fn new(hand: Hand, intention: Motion) -> Self {
         let position = intention.at(0.0).position.as_dvec3();
-        let (velocity, force) = (DVec3::ZERO, DVec3::ZERO);
-        Self { hand, intention, position, velocity, force, time: 0.0 }
+        let (velocity, force, aside) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        Self { hand, intention, position, velocity, force, aside, time: 0.0 }
     }
 
     /// The tip's velocity, in metres per second.
@@ -85,7 +97,10 @@ impl SimulatedDevice {
         for index in 0..steps as u64 {
             let now = self.time + index as f64 * step;
             let target = self.intention.at(now).position.as_dvec3();
-            let spring = (target - self.position) * self.hand.stiffness;
+            let missing = target - self.position;
+            self.aside = (self.aside + missing * (self.hand.correction * step))
+                .clamp_length_max(MOST_CORRECTION);
+            let spring = (missing + self.aside) * self.hand.stiffness;
             let damping = self.velocity * (Self::DAMPING + self.hand.damping);
             self.velocity += (self.force + spring - damping) * (step / mass);
             self.position += self.velocity * step;
@@ -124,7 +139,7 @@ mod tests {
             time,
             sample: DeviceSample::at(Vec3::X * x),
         });
-        let hand = Hand { mass: 0.1, damping: 1.0, stiffness: 100.0 };
+        let hand = Hand { mass: 0.1, damping: 1.0, stiffness: 100.0, correction: 0.0 };
         let motion = Motion::new(keyframes).expect("in order");
         let mut device = SimulatedDevice::new(hand, motion);
         let decay: f64 = 1.5 / (2.0 * 0.2);
@@ -136,6 +151,18 @@ mod tests {
             let expected = 0.01 * (1.0 - (-decay * time).exp() * (cos + decay / swing * sin));
             assert!((x - expected).abs() < 3e-5, "{x} for {expected} at {time} s");
         }
+    }
+
+    /// Of the 10 mm by which the force bends the hand little is left after a few seconds.
+    #[test]
+    fn who_looks_makes_up_for_a_force() {
+        let motion = Motion::at_rest(Vec3::ZERO).expect("finite");
+        let mut device = SimulatedDevice::new(Hand::GUIDED, motion);
+        device.write(Wrench { force: Vec3::Y * 4.0, torque: Vec3::ZERO }).expect("always there");
+        let place = device.read(0.2).expect("always there").position;
+        assert!(place.y > 0.004, "{place} after 0.2 s");
+        let place = device.read(4.0).expect("always there").position;
+        assert!(place.length() < 2e-5, "{place} after 4 s");
     }
 
     #[test]

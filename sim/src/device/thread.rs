@@ -63,6 +63,12 @@ impl<'c, D: HapticDevice> HapticLoop<'c, D> {
     /// A tick at `time` seconds on the loop's clock, which must be more than at the tick before. It never
     /// waits, but for the device.
     pub fn tick(&mut self, time: f64) -> Wrench {
+        // Whoever ticks by hand is never late.
+        self.ticks.began(0.0, 0);
+        self.exert(time)
+    }
+
+    fn exert(&mut self, time: f64) -> Wrench {
         let (number, model) = self.end.model();
         let read = self.device.read(time).and_then(|sample| {
             if sample.is_finite() { Ok(sample) } else { Err(DeviceError::NonFinite) }
@@ -158,7 +164,7 @@ impl<D: HapticDevice> HapticLoop<'_, D> {
             let lateness = now.saturating_duration_since(due);
             let missed = (lateness.as_nanos() / period.as_nanos()) as u32;
             self.ticks.began(lateness.as_secs_f64(), u64::from(missed));
-            self.tick(now.duration_since(began).as_secs_f64());
+            self.exert(now.duration_since(began).as_secs_f64());
             due += period * (missed + 1);
         }
         // A device that cannot be told to let go now lets go by its own watchdog.

@@ -200,9 +200,11 @@ impl Object {
         }
     }
 
-    /// A copy of what a renderer sees, without the behaviour.
+    /// A copy of what a renderer sees; of the behaviour what that [shows](Behavior::show_in).
     #[must_use]
     pub fn snapshot(&self) -> Self {
+        let mut behavior: Box<dyn Behavior> = Box::new(Fixed);
+        self.behavior.show_in(&mut behavior);
         Self {
             id: self.id,
             group: self.group,
@@ -215,7 +217,7 @@ impl Object {
             visual: self.visual,
             drawing: self.drawing,
             geometry: self.geometry.clone(),
-            behavior: Box::new(Fixed),
+            behavior,
         }
     }
 
@@ -235,5 +237,6 @@ impl Object {
             (Geometry::Volume(from), Geometry::Volume(to)) => to.copy_from(from),
             (from, to) => to.clone_from(from),
         }
+        self.behavior.show_in(&mut snapshot.behavior);
     }
 }

@@ -212,7 +212,8 @@ impl SceneSpec for Synthetic {
 }
 
 /// A session that a device led in the pipeline is replayed to the same bits in other executors, where there
-/// is no device; and the same session in one thread is the same to the last tick.
+/// is no device; and the same session in one thread, or where copies are drawn beside the next frame, is the
+/// same to the last tick.
 #[test]
 fn a_session_is_replayed() {
     let entry = head().plan.burr_hole;
@@ -228,8 +229,10 @@ fn a_session_is_replayed() {
     let mut recorder = Recorder::begin(&mut bytes, &header, &recorded).expect("it begins");
     let seen = session.run(&mut recorded, Some(&mut recorder));
     recorder.finish(&recorded).expect("it is written");
-    let again = session.alone();
-    assert!(seen.hash == again.hash && seen.ticks == again.ticks);
+    let beside = manager(scene(), ExecutorKind::RayonOverlapped, 2);
+    for again in [session.alone(), session.run(&mut { beside }, None)] {
+        assert!(seen.hash == again.hash && seen.ticks == again.ticks);
+    }
     for (executor, threads) in [(ExecutorKind::Serial, 1), (ExecutorKind::Static, 2)] {
         let mut replay = Replay::new(&bytes[..]).expect("a recording");
         let mut scene = scene();

@@ -263,8 +263,12 @@ pub(in crate::app) struct CraniotomyArgs {
     /// Write the computed tomography as it is after the operation, as NIfTI
     #[arg(long, value_name = "FILE.nii.gz")]
     pub(in crate::app) save: Option<PathBuf>,
+    /// Let the script operate through haptic devices, simulated in hands that give way, without a window
+    #[arg(long, conflicts_with = "window")]
+    pub(in crate::app) simulated_devices: bool,
     #[arg(long, value_name = "HZ", default_value_t = RATE, value_parser = parse_rate,
-          help = format!("How often a second the haptic loops of a window's hands tick, 1 to {MAX_RATE}"))]
+          help = format!("How often a second the hands' haptic loops tick, 1 to {MAX_RATE}; simulated \
+                          devices take 500 and more"))]
     pub(in crate::app) haptic_rate: f64,
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_FRAMES),
           help = format!("Number of frames, 1 to {MAX_FRAMES}; if not given, the operation's own, or in a \

@@ -94,7 +94,7 @@ impl<'c> Scenario for CraniotomyAtHand<'_, 'c> {
         if self.is_free(manager)
             && let Some(ends) = self.unlinked.take()
         {
-            self.surgery.link(ends);
+            (0..).zip(ends).for_each(|(hand, end)| self.surgery.link(hand, end));
         }
         Ok(())
     }
