@@ -10,8 +10,8 @@ use dualframe_sim::scene::craniotomy::TIME_STEP;
 use super::craniotomy::Surgery;
 use super::haptics::Each;
 
-/// Hands that hold their devices firmly, and look. Their loops tick between the frames, so that the same script comes to
-/// the same bits however long a frame takes.
+/// Hands that hold their devices firmly, and look. Their loops tick between the frames, so that the same
+/// script comes to the same bits however long a frame takes.
 pub(super) struct Operator<'c> {
     loops: Vec<HapticLoop<'c, SimulatedDevice>>,
     /// Ticks a second.
