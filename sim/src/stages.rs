@@ -127,9 +127,9 @@ impl Stages {
     /// Updates the objects of a block.
     ///
     /// `workspace` must have [received] this frame's interaction results for the block, and has none
-    /// afterwards. `mail` gives the messages to an
-    /// object in the order in which they are to be processed: by sender, then by order of posting.
-    /// `post` is given (from, to, message) for each message that an object sends.
+    /// afterwards. `mail` gives the messages to an object in the order in which they are to be processed:
+    /// by sender, then by order of posting. `post` is given (from, to, message) for each message that an
+    /// object sends.
     ///
     /// An object whose callback panics, whose state is not finite afterwards, or that is over budget
     /// is quarantined.
