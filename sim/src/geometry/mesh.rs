@@ -40,13 +40,13 @@ pub struct Mesh {
     pub positions: Vectors,
     /// The nodes' velocities, in metres per second.
     pub velocities: Vectors,
-    /// Bodies of one make share them: a third less to be brought into the caches for each.
+    /// Bodies of one make share them: a quarter less to be brought into the caches for each.
     masses: Arc<Masses>,
     contact_radius: f32,
 }
 
 /// The nodes' masses, which never change.
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 struct Masses {
     /// In kilograms.
     masses: Vec<Lanes>,
