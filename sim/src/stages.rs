@@ -11,7 +11,7 @@ use glam::Vec3;
 
 use crate::behavior::{Gathered, Input, Segment, SpringWork, Workspace, batch};
 use crate::block::Block;
-use crate::interaction::{Contact, ContactSink, Rules, Scratch, TableFull};
+use crate::interaction::{Contact, ContactSink, PairScratch, Rules, Scratch, TableFull};
 use crate::message::Message;
 use crate::object::{Drawing, Fault, FaultKind, Object, ObjectId};
 use crate::render::Renderer;
@@ -61,7 +61,7 @@ impl Stages {
         }
         // Around walls a block's box says little, but there are few of them.
         let (few, many) = if a.objects.len() < b.objects.len() { (a, b) } else { (b, a) };
-        few.boxes.overlapping(self.simd, many.bounds(), 0).next().is_some()
+        few.reaches(self.simd, &many.bounds())
     }
 
     /// Whether objects within one block may touch each other.
@@ -83,14 +83,11 @@ impl Stages {
         sink: &mut impl ContactSink,
     ) -> Result<PairCount, TableFull> {
         let (few, many) = if a.objects.len() < b.objects.len() { (a, b) } else { (b, a) };
-        let mut count = PairCount::default();
-        for place in few.boxes.overlapping(self.simd, many.bounds(), 0) {
-            let one = &few.objects[place];
-            for other in many.boxes.overlapping(self.simd, one.bounds(), 0) {
-                count += self.interact_pair(one, &many.objects[other], scratch, sink)?;
-            }
-        }
-        Ok(count)
+        let Scratch { pairs, pair } = scratch;
+        pairs.clear();
+        few.overlaps(self.simd, many, pairs);
+        let objects = pairs.iter().map(|&[one, other]| [&few.objects[one], &many.objects[other]]);
+        self.interact_pairs(objects, pair, sink)
     }
 
     /// Lets the objects within one block interact with each other.
@@ -103,25 +100,27 @@ impl Stages {
         scratch: &mut Scratch,
         sink: &mut impl ContactSink,
     ) -> Result<PairCount, TableFull> {
+        let Scratch { pairs, pair } = scratch;
+        pairs.clear();
+        block.overlaps_within(self.simd, pairs);
+        let objects = pairs.iter().map(|places| places.map(|place| &block.objects[place]));
+        self.interact_pairs(objects, pair, sink)
+    }
+
+    fn interact_pairs<'o>(
+        &self,
+        pairs: impl Iterator<Item = [&'o Object; 2]>,
+        scratch: &mut PairScratch,
+        sink: &mut impl ContactSink,
+    ) -> Result<PairCount, TableFull> {
         let mut count = PairCount::default();
-        for (place, one) in block.objects.iter().enumerate() {
-            for other in block.boxes.overlapping(self.simd, one.interaction_bounds(), place + 1) {
-                count += self.interact_pair(one, &block.objects[other], scratch, sink)?;
+        for [a, b] in pairs {
+            if let Some((pair, bodies)) = self.rules.find(a, b) {
+                let touched = scratch.interact(pair, bodies, self, sink)?;
+                count += PairCount { candidates: 1, collisions: u64::from(touched) };
             }
         }
         Ok(count)
-    }
-
-    fn interact_pair(
-        &self,
-        a: &Object,
-        b: &Object,
-        scratch: &mut Scratch,
-        sink: &mut impl ContactSink,
-    ) -> Result<PairCount, TableFull> {
-        let Some((pair, bodies)) = self.rules.find(a, b) else { return Ok(PairCount::default()) };
-        let touched = scratch.interact(pair, bodies, self, sink)?;
-        Ok(PairCount { candidates: 1, collisions: u64::from(touched) })
     }
 
     /// Updates the objects of a block.
@@ -165,7 +164,7 @@ impl Stages {
         }
         batch::advance(&mut block.objects, springs, self.simd);
         for waiting in springs.waiting.drain(..) {
-            block.objects[waiting.place].refresh(frame);
+            block.objects[waiting.place].refresh(frame, self.simd);
         }
         records.clear();
         segments.clear();
@@ -217,7 +216,7 @@ impl Stages {
         } else if began.is_some_and(|(began, budget)| began.elapsed() > budget) {
             object.quarantine(Fault { kind: FaultKind::OverBudget, frame });
         } else if object.quarantined().is_none() {
-            object.refresh(frame);
+            object.refresh(frame, self.simd);
         }
     }
 

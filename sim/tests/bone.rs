@@ -88,7 +88,7 @@ impl Behavior for Drill {
     }
 
     fn burr(&self, geometry: &Geometry) -> Option<Burr> {
-        Some(self.at(geometry.center()))
+        Some(self.at(geometry.as_rigid()?.pose.translation))
     }
 
     fn hash_state(&self, hasher: &mut dyn std::hash::Hasher) {
@@ -158,7 +158,7 @@ fn session(settings: Settings) -> ([u64; 3], Vec3) {
     assert_eq!(removed + left, whole, "what was removed is missing");
     let voxels = free(&mut scene);
     assert!((500..4_000).contains(&voxels), "{voxels} voxels came free");
-    let center = scene.objects[3].geometry.center();
+    let center = scene.objects[3].center();
     // The tools go away, and a hand lifts the disc.
     let post = |message| scene.mailbox.post(PIECE, message);
     let point = TOP - Vec3::Z * 1e-3;

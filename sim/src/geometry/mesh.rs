@@ -5,9 +5,10 @@ use std::sync::Arc;
 use glam::Vec3;
 use thiserror::Error;
 
-use super::bounds::Bounds;
+use super::extent::{Extent, Measure};
 use super::topology::Topology;
-use super::vectors::{Lanes, Vectors, in_lanes, lane_sum};
+use super::vectors::{Lanes, Vectors, in_lanes};
+use crate::simd::Simd;
 
 /// Why a mesh cannot be built.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
@@ -169,21 +170,12 @@ impl Mesh {
     /// The mean of the nodes' positions, in metres.
     #[must_use]
     pub fn center(&self) -> Vec3 {
-        let nodes = self.topology.nodes().max(1) as f32;
-        Vec3::from_array(self.positions.components.each_ref().map(|lanes| lane_sum(lanes) / nodes))
+        self.extent(Simd::detect()).center
     }
 
-    /// The box around the contact spheres of all nodes.
-    #[must_use]
-    pub fn bounds(&self) -> Bounds {
-        let (min, max) = self.positions.extremes();
-        Bounds { min, max }.inflated(self.contact_radius)
-    }
-
-    /// Whether every position and velocity is a finite number.
-    #[must_use]
-    pub fn is_finite(&self) -> bool {
-        self.positions.is_finite() && self.velocities.is_finite()
+    /// Where it is, by these instructions.
+    pub(super) fn extent(&self, simd: Simd) -> Extent {
+        simd.run(Measure(self))
     }
 
     /// Whether positions and velocities, which anybody may replace, are as many as there are nodes.

@@ -2,6 +2,7 @@
 
 mod bounds;
 mod cut;
+mod extent;
 mod icosphere;
 mod mesh;
 mod ray;
@@ -10,11 +11,11 @@ mod topology;
 mod vectors;
 mod volume;
 
-use glam::Vec3;
-
 pub use bounds::Bounds;
 pub use cut::Blade;
 pub(crate) use cut::{Birth, CutNode, CutSurface, Sweep};
+pub use extent::Extent;
+pub(crate) use extent::{greatest, least};
 pub use icosphere::{ICOSPHERE_EDGES, ICOSPHERE_FACES, ICOSPHERE_NODES, icosphere};
 pub(crate) use mesh::KernelParts;
 pub use mesh::{Mesh, MeshError};
@@ -23,6 +24,8 @@ pub(crate) use topology::Slot;
 pub use topology::{Spring, Topology, TopologyError, edges};
 pub use vectors::{LANES, Lanes, Vectors};
 pub use volume::{BRICK_SIDE, BRICK_VOXELS, Brick, Part, Volume, VolumeError, Voxel};
+
+use crate::simd::Simd;
 
 /// An object's shape and place.
 #[derive(Clone)]
@@ -87,34 +90,21 @@ impl Geometry {
         }
     }
 
-    /// The middle of it, in metres: the mean of a surface's nodes, a rigid shape's origin, a
-    /// volume's middle.
+    /// Where it is, by these instructions.
     #[must_use]
-    pub fn center(&self) -> Vec3 {
+    pub fn extent(&self, simd: Simd) -> Extent {
         match self {
-            Self::Mesh(mesh) => mesh.center(),
-            Self::Rigid(rigid) => rigid.pose.translation,
-            Self::Volume(volume) => volume.center(),
-        }
-    }
-
-    /// The box around it, contact spheres and a volume's margin included.
-    #[must_use]
-    pub fn bounds(&self) -> Bounds {
-        match self {
-            Self::Mesh(mesh) => mesh.bounds(),
-            Self::Rigid(rigid) => rigid.bounds(),
-            Self::Volume(volume) => volume.bounds().inflated(volume.margin),
-        }
-    }
-
-    /// Whether every number in it that changes is finite.
-    #[must_use]
-    pub fn is_finite(&self) -> bool {
-        match self {
-            Self::Mesh(mesh) => mesh.is_finite(),
-            Self::Rigid(rigid) => rigid.is_finite(),
-            Self::Volume(volume) => volume.is_finite(),
+            Self::Mesh(mesh) => mesh.extent(simd),
+            Self::Rigid(rigid) => Extent {
+                bounds: rigid.bounds(),
+                center: rigid.pose.translation,
+                finite: rigid.is_finite(),
+            },
+            Self::Volume(volume) => Extent {
+                bounds: volume.bounds().inflated(volume.margin),
+                center: volume.center(),
+                finite: volume.is_finite(),
+            },
         }
     }
 }

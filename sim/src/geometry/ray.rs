@@ -5,6 +5,7 @@ use parry3d::query::{Ray, RayCast};
 use parry3d::shape::Triangle;
 
 use super::{Bounds, Geometry, Mesh, Volume};
+use crate::simd::Simd;
 
 impl Geometry {
     /// How far a ray goes until it meets the surface, in metres; `None` if it does not within `reach`
@@ -12,7 +13,7 @@ impl Geometry {
     /// or of bone meets it at once. `direction` is of unit length.
     #[must_use]
     pub fn cast(&self, origin: Vec3, direction: Vec3, reach: f32) -> Option<f32> {
-        let within = crossed(&self.bounds(), origin, direction, reach)?;
+        let within = crossed(&self.extent(Simd::detect()).bounds, origin, direction, reach)?;
         match self {
             Self::Mesh(mesh) => cast_mesh(mesh, &Ray::new(origin, direction), reach),
             Self::Rigid(rigid) => {

@@ -2,8 +2,6 @@
 
 use glam::Vec3;
 
-use crate::simd::fold;
-
 /// Nodes that the kernels handle at once. Sums over lanes are taken in a fixed order, so this number
 /// is part of what makes results equal on every machine: it never follows the machine's vector width.
 pub const LANES: usize = 16;
@@ -98,65 +96,6 @@ impl Vectors {
         }
         self.len = other.len;
     }
-
-    /// Whether every component of every vector is a finite number.
-    #[must_use]
-    pub fn is_finite(&self) -> bool {
-        // A number times zero is zero, an infinity or a NaN times zero is a NaN.
-        let mut zeros = [0.0; LANES];
-        for lanes in self.components.iter().flatten() {
-            for (zero, value) in zeros.iter_mut().zip(lanes) {
-                *zero += value * 0.0;
-            }
-        }
-        zeros == [0.0; LANES]
-    }
-
-    /// The least and the greatest components over all vectors; of no meaning where one is a NaN.
-    pub(crate) fn extremes(&self) -> (Vec3, Vec3) {
-        let (mut least, mut greatest) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        for axis in 0..3 {
-            let (low, high) = range(&self.components[axis], self.len);
-            least[axis] = low;
-            greatest[axis] = high;
-        }
-        (least, greatest)
-    }
-}
-
-/// The least and the greatest of the first `len` numbers.
-fn range(lanes: &[Lanes], len: usize) -> (f32, f32) {
-    let (whole, rest) = lanes.as_flattened()[..len].as_chunks::<LANES>();
-    let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
-    let mut widen = |lane: usize, value: f32| {
-        // Not `f32::min`: its promise about NaNs costs two more instructions a value.
-        low[lane] = if value < low[lane] { value } else { low[lane] };
-        high[lane] = if value > high[lane] { value } else { high[lane] };
-    };
-    for chunk in whole {
-        for (lane, &value) in chunk.iter().enumerate() {
-            widen(lane, value);
-        }
-    }
-    for (lane, &value) in rest.iter().enumerate() {
-        widen(lane, value);
-    }
-    (
-        low.into_iter().fold(f32::INFINITY, f32::min),
-        high.into_iter().fold(f32::NEG_INFINITY, f32::max),
-    )
-}
-
-/// The sum of all numbers, lane by lane first. The padding is zero.
-#[inline(always)]
-pub(crate) fn lane_sum(lanes: &[Lanes]) -> f32 {
-    let mut sum = [0.0; LANES];
-    for chunk in lanes {
-        for lane in 0..LANES {
-            sum[lane] += chunk[lane];
-        }
-    }
-    fold(sum)
 }
 
 /// `len` numbers, padded with zeros.

@@ -59,19 +59,21 @@ pub trait Response: Send + Sync {
 /// interaction need not allocate.
 const NODES: usize = 256;
 
+/// Pairs of objects of two blocks for which there is room from the start, likewise; usually 256, those
+/// of all objects of two full blocks.
+const PAIRS: usize = 256;
+
 /// Memory that the interactions of one worker use one after the other.
 #[derive(Debug)]
 pub struct Scratch {
-    touches: Touches,
-    impulses: [Impulses; 2],
+    /// The places of objects whose boxes overlap, while two blocks interact.
+    pub(crate) pairs: Vec<[usize; 2]>,
+    pub(crate) pair: PairScratch,
 }
 
 impl Default for Scratch {
     fn default() -> Self {
-        let mut scratch = Self { touches: Touches::default(), impulses: Default::default() };
-        scratch.impulses.iter_mut().for_each(|impulses| impulses.reset(NODES));
-        scratch.touches.near.iter_mut().for_each(|near| near.reserve(NODES / LANES));
-        scratch
+        Self { pairs: Vec::with_capacity(PAIRS), pair: PairScratch::default() }
     }
 }
 
@@ -81,7 +83,25 @@ impl Scratch {
     pub fn new() -> Self {
         Self::default()
     }
+}
 
+/// What the interaction of one pair works in.
+#[derive(Debug)]
+pub(crate) struct PairScratch {
+    touches: Touches,
+    impulses: [Impulses; 2],
+}
+
+impl Default for PairScratch {
+    fn default() -> Self {
+        let mut scratch = Self { touches: Touches::default(), impulses: Default::default() };
+        scratch.impulses.iter_mut().for_each(|impulses| impulses.reset(NODES));
+        scratch.touches.near.iter_mut().for_each(|near| near.reserve(NODES / LANES));
+        scratch
+    }
+}
+
+impl PairScratch {
     /// Lets two objects interact and stores the results; says whether they touched.
     pub(crate) fn interact(
         &mut self,

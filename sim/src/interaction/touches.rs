@@ -1,6 +1,8 @@
 //! The results module of an interaction pair (Fig. 3): what detection found.
 
-use crate::geometry::{Bounds, LANES, Lanes, Mesh};
+use glam::Vec3;
+
+use crate::geometry::{Bounds, LANES, Lanes, Mesh, greatest, least};
 use crate::simd::{Isa, LaneSet, Simd, first_lanes};
 
 /// A place where two objects touch.
@@ -129,17 +131,10 @@ impl NearNodes {
                 high[axis] = isa.max(lanes, high[axis]);
             }
         }
-        let mut bounds = Bounds::EMPTY;
-        for axis in 0..3 {
-            let (mut lows, mut highs) = ([0.0; LANES], [0.0; LANES]);
-            isa.store(low[axis], &mut lows);
-            isa.store(high[axis], &mut highs);
-            for lane in 0..LANES {
-                bounds.min[axis] = bounds.min[axis].min(lows[lane]);
-                bounds.max[axis] = bounds.max[axis].max(highs[lane]);
-            }
+        Bounds {
+            min: Vec3::from_array(low.map(|lanes| least(isa, lanes))),
+            max: Vec3::from_array(high.map(|lanes| greatest(isa, lanes))),
         }
-        bounds
     }
 
     /// Makes room for the nodes of so many chunks.

@@ -10,8 +10,9 @@ use std::time::Duration;
 use glam::Vec3;
 
 use crate::behavior::{Behavior, Fixed};
-use crate::geometry::{Bounds, Geometry};
+use crate::geometry::{Bounds, Extent, Geometry};
 use crate::message::Message;
+use crate::simd::Simd;
 
 pub use fault::{Fault, FaultKind};
 pub use visual::{Drawing, VisualProperties};
@@ -71,14 +72,15 @@ impl Object {
         geometry: Geometry,
         behavior: impl Behavior + 'static,
     ) -> Self {
+        let Extent { bounds, center, .. } = geometry.extent(Simd::detect());
         Self {
             id,
             group,
             solitary: false,
             fixed: behavior.is_fixed(),
             quarantined: None,
-            bounds: geometry.bounds(),
-            center: geometry.center(),
+            bounds,
+            center,
             cost: 0.0,
             visual: VisualProperties::default(),
             drawing: Drawing::default(),
@@ -165,16 +167,20 @@ impl Object {
     /// Fits box and centre to a geometry that was changed from outside. Within an environment that is
     /// done after every update.
     pub fn refit(&mut self) {
+        self.fit(self.geometry.extent(Simd::detect()));
+    }
+
+    fn fit(&mut self, Extent { bounds, center, .. }: Extent) {
         if self.quarantined.is_none() {
-            self.bounds = self.geometry.bounds();
-            self.center = self.geometry.center();
+            (self.bounds, self.center) = (bounds, center);
         }
     }
 
     /// Brings the box up to date, or excludes the object if its state is not finite.
-    pub(crate) fn refresh(&mut self, frame: u64) {
-        if self.geometry.is_finite() {
-            self.refit();
+    pub(crate) fn refresh(&mut self, frame: u64, simd: Simd) {
+        let extent = self.geometry.extent(simd);
+        if extent.finite {
+            self.fit(extent);
         } else {
             self.quarantine(Fault { kind: FaultKind::NonFinite, frame });
         }

@@ -262,13 +262,19 @@ pub(crate) type HalfLanes = [f32; HALF];
 /// The components x, y, z of one node and a number of no meaning.
 pub(crate) type Quad = [f32; 4];
 
-/// The sum over the lanes: the upper half is added to the lower half until one number is left.
+/// The sum over the lanes, in the order of [`fold_by`].
 #[inline(always)]
-pub(crate) fn fold(mut lanes: Lanes) -> f32 {
+pub(crate) fn fold(lanes: Lanes) -> f32 {
+    fold_by(lanes, |lower, upper| lower + upper)
+}
+
+/// Lanes made into one number: the lower half is joined with the upper half until one is left.
+#[inline(always)]
+pub(crate) fn fold_by(mut lanes: Lanes, join: impl Fn(f32, f32) -> f32) -> f32 {
     let mut half = LANES / 2;
     while half > 0 {
         for lane in 0..half {
-            lanes[lane] += lanes[lane + half];
+            lanes[lane] = join(lanes[lane], lanes[lane + half]);
         }
         half /= 2;
     }

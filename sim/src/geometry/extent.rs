@@ -1,0 +1,153 @@
+//! Where a geometry is: what the stages have to know of it after every update.
+
+use glam::Vec3;
+
+use super::bounds::Bounds;
+use super::mesh::Mesh;
+use super::vectors::{LANES, Lanes};
+use crate::simd::{Isa, Kernel, first_lanes, fold_by};
+
+/// Where a geometry is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// The box around it, contact spheres and a volume's margin included. Of no meaning if it is not
+    /// finite.
+    pub bounds: Bounds,
+    /// The middle of it, in metres: the mean of a surface's nodes, a rigid shape's origin, a volume's
+    /// middle.
+    pub center: Vec3,
+    /// Whether every number in it that changes is finite.
+    pub finite: bool,
+}
+
+/// Zeros, and after them what hides a lane of padding from a search for the least number.
+const HIDDEN: [f32; 2 * LANES] = {
+    let mut hidden = [0.0; 2 * LANES];
+    let mut lane = LANES;
+    while lane < 2 * LANES {
+        hidden[lane] = f32::INFINITY;
+        lane += 1;
+    }
+    hidden
+};
+
+/// The measuring of a mesh, in one pass over its nodes.
+pub(super) struct Measure<'a>(pub(super) &'a Mesh);
+
+impl Kernel for Measure<'_> {
+    type Output = Extent;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Extent {
+        let Self(mesh) = self;
+        let nodes = mesh.positions.len();
+        let mut extent = Extent { bounds: Bounds::EMPTY, center: Vec3::ZERO, finite: true };
+        // A number times zero is zero, an infinity or a NaN times zero is a NaN.
+        let nothing = isa.splat(0.0);
+        let mut zeros = nothing;
+        for axis in 0..3 {
+            let mut low = isa.splat(f32::INFINITY);
+            let mut high = isa.splat(f32::NEG_INFINITY);
+            let mut sum = nothing;
+            for (chunk, lanes) in mesh.positions.components[axis].iter().enumerate() {
+                let values = isa.load(lanes);
+                let hidden = isa.load(hidden_after(nodes - chunk * LANES));
+                low = isa.min(isa.add(values, hidden), low);
+                high = isa.max(isa.sub(values, hidden), high);
+                sum = isa.add(sum, values);
+                zeros = isa.add(zeros, isa.mul(values, nothing));
+            }
+            for lanes in &mesh.velocities.components[axis] {
+                zeros = isa.add(zeros, isa.mul(isa.load(lanes), nothing));
+            }
+            extent.bounds.min[axis] = least(isa, low) - mesh.contact_radius();
+            extent.bounds.max[axis] = greatest(isa, high) + mesh.contact_radius();
+            extent.center[axis] = isa.sum(sum) / nodes.max(1) as f32;
+        }
+        extent.finite = isa.at_most(zeros, nothing) == first_lanes(LANES);
+        extent
+    }
+}
+
+/// What hides all lanes after the first so many.
+#[inline(always)]
+fn hidden_after(count: usize) -> &'static Lanes {
+    HIDDEN[LANES - count.min(LANES)..].first_chunk().unwrap_or_else(|| unreachable!("two chunks"))
+}
+
+/// The least number of a vector that has no NaN.
+#[inline(always)]
+pub(crate) fn least<I: Isa>(isa: I, vector: I::Vector) -> f32 {
+    let mut lanes = [0.0; LANES];
+    isa.store(vector, &mut lanes);
+    fold_by(lanes, |a, b| if a < b { a } else { b })
+}
+
+/// The greatest number of a vector that has no NaN.
+#[inline(always)]
+pub(crate) fn greatest<I: Isa>(isa: I, vector: I::Vector) -> f32 {
+    let mut lanes = [0.0; LANES];
+    isa.store(vector, &mut lanes);
+    fold_by(lanes, |a, b| if a > b { a } else { b })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::geometry::{Geometry, Topology};
+    use crate::simd::Simd;
+
+    const RADIUS: f32 = 0.5;
+
+    /// `count` nodes away from the origin, where the padding is.
+    fn mesh(count: usize) -> Mesh {
+        let node = |index: usize| Vec3::new(3.0, 4.0, 5.0) + Vec3::splat(0.1 * index as f32);
+        let nodes: Vec<Vec3> = (0..count).map(node).collect();
+        let topology = Topology::new(&nodes, Vec::new(), &[], false).expect("a topology");
+        Mesh::new(Arc::new(topology), &nodes, &vec![1.0; count], RADIUS).expect("a mesh")
+    }
+
+    fn extent(mesh: Mesh, simd: Simd) -> Extent {
+        Geometry::Mesh(mesh).extent(simd)
+    }
+
+    #[test]
+    fn padding_is_outside_of_the_box() {
+        for count in [1, LANES - 1, LANES, LANES + 1, 42, 48] {
+            for simd in Simd::available() {
+                let (first, last) = (Vec3::new(3.0, 4.0, 5.0), 0.1 * (count - 1) as f32);
+                let Extent { bounds, center, finite } = extent(mesh(count), simd);
+                assert!((bounds.min - (first - RADIUS)).length() < 1e-5, "{count}, {simd:?}");
+                assert!(
+                    (bounds.max - (first + last + RADIUS)).length() < 1e-5,
+                    "{count}, {simd:?}"
+                );
+                assert!((center - (first + last / 2.0)).length() < 1e-5, "{count}, {simd:?}");
+                assert!(finite, "{count}, {simd:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_width_measures_the_same() {
+        let all: Vec<Extent> = Simd::available().map(|simd| extent(mesh(42), simd)).collect();
+        assert!(all.windows(2).all(|pair| pair[0] == pair[1]), "{all:?}");
+    }
+
+    #[test]
+    fn whatever_is_not_finite_is_found() {
+        for simd in Simd::available() {
+            for node in [0, 15, 16, 41] {
+                for wrong in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                    let [mut moved, mut pushed] = [mesh(42), mesh(42)];
+                    moved.positions.set(node, Vec3::new(0.0, wrong, 0.0));
+                    pushed.velocities.set(node, Vec3::new(wrong, 0.0, 0.0));
+                    assert!(!extent(moved, simd).finite, "{node}, {wrong}, {simd:?}");
+                    assert!(!extent(pushed, simd).finite, "{node}, {wrong}, {simd:?}");
+                }
+            }
+        }
+    }
+}
