@@ -47,12 +47,12 @@ impl Block {
     pub(crate) fn refresh(&mut self) {
         self.ids.clear();
         self.ids.extend(self.objects.iter().map(Object::id));
-        self.boxes.clear();
+        self.boxes.resize(self.objects.len());
         self.groups = 0;
         let mut bounds = Bounds::EMPTY;
-        for object in &self.objects {
+        for (place, object) in self.objects.iter().enumerate() {
             let own = object.interaction_bounds();
-            self.boxes.push(&own);
+            self.boxes.set(place, &own);
             bounds = bounds.union(&own);
             if own != Bounds::EMPTY {
                 self.groups |= group_set(object.group());
@@ -91,24 +91,27 @@ pub(crate) struct Boxes {
 }
 
 impl Boxes {
-    fn clear(&mut self) {
-        for component in self.min.iter_mut().chain(&mut self.max) {
-            component.clear();
+    /// Makes room for so many boxes; if there were as many before, they stay.
+    fn resize(&mut self, len: usize) {
+        if self.len == len {
+            return;
         }
-        self.len = 0;
+        let empty = [(&mut self.min, f32::INFINITY), (&mut self.max, f32::NEG_INFINITY)];
+        for (components, nothing) in empty {
+            for component in components {
+                component.clear();
+                component.resize(len.div_ceil(LANES), [nothing; LANES]);
+            }
+        }
+        self.len = len;
     }
 
-    fn push(&mut self, bounds: &Bounds) {
-        let (chunk, lane) = (self.len / LANES, self.len % LANES);
+    fn set(&mut self, place: usize, bounds: &Bounds) {
+        let (chunk, lane) = (place / LANES, place % LANES);
         for axis in 0..3 {
-            if lane == 0 {
-                self.min[axis].push([f32::INFINITY; LANES]);
-                self.max[axis].push([f32::NEG_INFINITY; LANES]);
-            }
             self.min[axis][chunk][lane] = bounds.min[axis];
             self.max[axis][chunk][lane] = bounds.max[axis];
         }
-        self.len += 1;
     }
 
     /// The chunks of boxes.
@@ -229,7 +232,8 @@ mod tests {
     /// A block of which only the boxes are looked at.
     fn block(all: &[Bounds]) -> Block {
         let mut block = Block::default();
-        all.iter().for_each(|own| block.boxes.push(own));
+        block.boxes.resize(all.len());
+        all.iter().enumerate().for_each(|(place, own)| block.boxes.set(place, own));
         block.bounds = Some(all.iter().fold(Bounds::EMPTY, |whole, own| whole.union(own)));
         block
     }

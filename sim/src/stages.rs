@@ -59,9 +59,9 @@ impl Stages {
         if !a.bounds().overlaps(&b.bounds()) || !self.rules.apply(a.groups(), b.groups()) {
             return false;
         }
-        // Around walls a block's box says little, but there are few of them.
-        let (few, many) = if a.objects.len() < b.objects.len() { (a, b) } else { (b, a) };
-        few.reaches(self.simd, &many.bounds())
+        // The box around walls says nothing, but each of them has one; and so has each object that is to
+        // reach them.
+        a.reaches(self.simd, &b.bounds()) && b.reaches(self.simd, &a.bounds())
     }
 
     /// Whether objects within one block may touch each other.

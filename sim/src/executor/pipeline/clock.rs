@@ -10,11 +10,11 @@ use dualframe_core::unit::Work;
 use crate::executor::StageSeconds;
 use crate::timeline::Timeline;
 
-/// Of so many frames one is timed; usually 7. Reading the system's clock takes some 50 ns, and with one
+/// Of so many frames one is timed; usually 31. Reading the system's clock takes some 50 ns, and with one
 /// object a unit every work unit is a change of stage: timing every frame would cost more than
 /// synchronising it. A number without common divisors with the frames of a batch, so that its first
 /// ones are timed no more often than others.
-const FRAMES_PER_SAMPLE: u32 = 7;
+const FRAMES_PER_SAMPLE: u32 = 31;
 
 /// What a worker is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
