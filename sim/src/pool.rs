@@ -91,8 +91,10 @@ pub(crate) struct Crew {
     aborted: AtomicBool,
     phase: Mutex<Phase>,
     changed: Condvar,
-    /// `Phase::run`, to look at without the lock.
+    /// `Phase` once more, to look at without the lock.
     run: AtomicUsize,
+    present: AtomicUsize,
+    closed: AtomicBool,
 }
 
 #[derive(Debug, Default)]
@@ -138,7 +140,9 @@ impl Crew {
     pub(crate) fn await_run(&self, last: usize, pool: &Pool, index: usize) -> Option<usize> {
         let wanted = || index < pool.threads();
         let started = || self.run.load(Ordering::Acquire) != last;
-        pool.spin(|| started() && wanted());
+        // Acquire: with the Release in `close`; nothing else is read by it.
+        let closed = || self.closed.load(Ordering::Acquire);
+        pool.spin(|| started() && wanted() || closed());
         let mut phase = lock(&self.phase);
         loop {
             if phase.closed {
@@ -153,22 +157,44 @@ impl Crew {
 
     /// A hired thread is ready: it has taken the memory that it needs.
     pub(crate) fn report(&self) {
-        lock(&self.phase).present += 1;
+        let mut phase = lock(&self.phase);
+        phase.present += 1;
+        // Release: with the Acquire in `await_present`, which need not see more than the number.
+        self.present.store(phase.present, Ordering::Release);
+        drop(phase);
         self.changed.notify_all();
     }
 
     /// Waits until so many hired threads are ready.
-    pub(crate) fn await_present(&self, hired: usize) {
+    pub(crate) fn await_present(&self, hired: usize, pool: &Pool) {
+        if pool.spin(|| self.present.load(Ordering::Acquire) >= hired) {
+            return;
+        }
         let mut phase = lock(&self.phase);
         while phase.present < hired {
             phase = self.changed.wait(phase).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
+    /// A hired thread goes home.
+    pub(crate) fn leave(&self) {
+        let mut phase = lock(&self.phase);
+        phase.present -= 1;
+        // Release: as in `report`, with the Acquire in `see_off`.
+        self.present.store(phase.present, Ordering::Release);
+    }
+
     /// Sends everybody home.
     pub(crate) fn close(&self) {
         lock(&self.phase).closed = true;
+        self.closed.store(true, Ordering::Release);
         self.changed.notify_all();
+    }
+
+    /// Waits until everybody who was sent home has gone, unless that takes so long that the caller had
+    /// better sleep.
+    pub(crate) fn see_off(&self, pool: &Pool) {
+        pool.spin(|| self.present.load(Ordering::Acquire) == 0);
     }
 
     /// Makes everybody leave the run under way.

@@ -158,7 +158,8 @@ pub trait Executor {
     ///
     /// # Errors
     /// One of the pipeline's tables is full. The environment cannot go on then: a frame without some
-    /// of its interactions would not be the same for every schedule.
+    /// of its interactions would not be the same for every schedule. Or the pipeline's pool was enlarged
+    /// and the threads cannot be had; frames before that are done, and it can go on.
     fn advance(
         &mut self,
         frames: u64,

@@ -87,21 +87,39 @@ pub(super) struct Parcel {
     pub(super) message: Message,
 }
 
-/// One worker's view of the environment.
-pub(super) struct Host<'s> {
-    shared: &'s Shared<'s>,
+/// What a worker works in, kept from run to run: its memory is there and warm.
+pub(super) struct Own {
     scratch: RefCell<Scratch>,
     workspace: RefCell<Workspace>,
     results: RefCell<ContactBuffer>,
     letters: RefCell<Vec<Parcel>>,
 }
 
+impl Own {
+    fn with_room(room: Room) -> Self {
+        Self {
+            scratch: RefCell::default(),
+            workspace: RefCell::new(Workspace::with_room(room)),
+            results: RefCell::new(ContactBuffer::with_capacity(RECORDS_PER_CANDIDATE)),
+            letters: RefCell::default(),
+        }
+    }
+}
+
+/// One worker's view of the environment.
+pub(super) struct Host<'s> {
+    shared: &'s Shared<'s>,
+    own: Own,
+}
+
 impl<'s> Host<'s> {
-    pub(super) fn new(shared: &'s Shared<'s>) -> Self {
-        let results = RefCell::new(ContactBuffer::with_capacity(RECORDS_PER_CANDIDATE));
-        let workspace = RefCell::new(Workspace::with_room(shared.room));
-        let (scratch, letters) = (RefCell::default(), RefCell::default());
-        Self { shared, scratch, workspace, results, letters }
+    /// That of a worker who was here before, or of a new one.
+    pub(super) fn new(shared: &'s Shared<'s>, own: Option<Own>) -> Self {
+        Self { shared, own: own.unwrap_or_else(|| Own::with_room(shared.room)) }
+    }
+
+    pub(super) fn into_own(self) -> Own {
+        self.own
     }
 }
 
@@ -137,8 +155,8 @@ impl<'s> Environment for Host<'s> {
         count: &mut PairCount,
         contacts: &mut Contacts<'_, '_, Contact>,
     ) -> Result<(), TableFull> {
-        let (stages, scratch) = (self.shared.stages, &mut *self.scratch.borrow_mut());
-        let results = &mut *self.results.borrow_mut();
+        let (stages, scratch) = (self.shared.stages, &mut *self.own.scratch.borrow_mut());
+        let results = &mut *self.own.results.borrow_mut();
         results.clear();
         let counted = if pair.ends[0] == pair.ends[1] {
             stages.interact_within(&a.block, scratch, results)
@@ -159,7 +177,7 @@ impl<'s> Environment for Host<'s> {
         inputs: &mut Inputs<'_, '_, Self>,
     ) -> Result<(), TableFull> {
         let shared = self.shared;
-        let letters = &mut *self.letters.borrow_mut();
+        let letters = &mut *self.own.letters.borrow_mut();
         letters.clear();
         while let Some((_, parcel)) = inputs.next_letter() {
             letters.push(parcel);
@@ -170,7 +188,7 @@ impl<'s> Environment for Host<'s> {
             let own = letters.iter().filter(move |parcel| parcel.to == object);
             own.map(|parcel| &parcel.message).chain(from_outside.to(object))
         };
-        let workspace = &mut *self.workspace.borrow_mut();
+        let workspace = &mut *self.own.workspace.borrow_mut();
         let Unit { block, pairs } = unit;
         *pairs = PairCount::default();
         // The block brings them into its objects' order itself.

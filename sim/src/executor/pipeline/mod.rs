@@ -1,12 +1,14 @@
 //! The dual-frame pipeline (§5) over the core: blocks are its units, threads its workers.
 //!
-//! Frames run in batches of [`FRAMES_PER_BLOCKING`](crate::blocking::FRAMES_PER_BLOCKING). Between two batches the pipeline is at rest:
-//! blocks are formed anew, tables grow if they have come to be half full, threads join.
+//! Frames run in batches of [`FRAMES_PER_BLOCKING`](crate::blocking::FRAMES_PER_BLOCKING). Between two
+//! batches the pipeline is at rest: blocks are formed anew, tables grow if they have come to be half full,
+//! threads join. Threads, and the memory they work in, are kept from one run to the next.
 
 mod clock;
 mod host;
 mod memory;
 mod run;
+mod team;
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -18,7 +20,8 @@ pub use dualframe_core::frame::Entry;
 
 use self::host::{Parcel, Screen, Shared};
 use self::memory::{Tables, modelled_interactions, spare_interactions};
-use self::run::{Context, Regrouping, Report};
+use self::run::{Context, End, Regrouping, Report};
+use self::team::Team;
 use super::outside::Outside;
 use super::{Executor, ExecutorError, FrameRecord, StageSeconds, world};
 use crate::block::Block;
@@ -42,6 +45,7 @@ pub struct PipelineExecutor {
     config: Config,
     grain: Grain,
     pool: Arc<Pool>,
+    team: Team,
     frame: u64,
     /// Objects' messages for the next frame.
     mail: Vec<(From, Parcel)>,
@@ -63,13 +67,21 @@ impl PipelineExecutor {
         pool: Arc<Pool>,
     ) -> Result<Self, ExecutorError> {
         let Scene { objects, stages, frame, mail: under_way, mailbox } = scene;
-        let (blocking, blocks) = Blocking::new(objects, grain, pool.threads())?;
+        let (mut blocking, mut blocks) = Blocking::new(objects, grain, pool.threads())?;
+        // As many as there are threads now; whoever joins later shares one.
+        let homes = pool.threads().min(MOST_HOMES);
+        if grain == Grain::Spatial {
+            blocks.iter_mut().for_each(|block| blocking.drain(block));
+            blocking.split();
+            blocking.deal(homes as u32);
+            for (index, block) in blocks.iter_mut().enumerate() {
+                blocking.fill(index, block);
+            }
+        }
         let (broad_phase, interactions) = match grain {
             Grain::Spatial => (BroadPhase::Spatial, spare_interactions(blocks.len())),
             Grain::Pairwise => (BroadPhase::Pairwise, modelled_interactions(&stages, &blocks)),
         };
-        // As many as there are threads now; whoever joins later shares one.
-        let homes = pool.threads().min(MOST_HOMES);
         let mut mail = Vec::new();
         let outside = Outside::new(mailbox, under_way, frame, |from, to, message| {
             let from = From { sender: from.0, sequence: mail.len() as u32 };
@@ -83,6 +95,7 @@ impl PipelineExecutor {
             config: Config { broad_phase, entry, tokens: 1, homes: homes as u32 },
             grain,
             pool,
+            team: Team::default(),
             frame,
             mail,
             outside,
@@ -92,13 +105,13 @@ impl PipelineExecutor {
         })
     }
 
-    /// Runs up to `frames` frames with the tables as they are, and says how many it ran.
+    /// Runs up to `frames` frames with tables and team as they are, and says why it ended.
     fn run(
         &mut self,
         frames: u64,
         renderer: &mut dyn Renderer,
         on_frame: &mut dyn FnMut(&FrameRecord),
-    ) -> Result<u64, ExecutorError> {
+    ) -> Result<End, ExecutorError> {
         let most_contacts = self.tables.contact_capacity() / 2;
         let shared = Shared::new(&self.stages, &self.outside, self.frame, &self.blocks);
         self.tables.load(&mut self.blocks);
@@ -110,6 +123,7 @@ impl PipelineExecutor {
             shared: &shared,
             crew: &crew,
             pool: &self.pool,
+            team: &self.team,
             report: &report,
             timeline: self.timeline.as_deref(),
         };
@@ -119,7 +133,7 @@ impl PipelineExecutor {
             homes: self.config.homes,
             most_contacts,
         };
-        let (done, hiring) = context.run(
+        let (done, end) = context.run(
             frames,
             pipeline,
             regrouping,
@@ -129,8 +143,7 @@ impl PipelineExecutor {
         self.tables.unload(&mut self.blocks);
         self.frame += done;
         (self.seconds, self.failure) = (report.seconds, report.failure);
-        hiring.map_err(ExecutorError::Spawn)?;
-        self.failure.map_or(Ok(done), |full| Err(full.into()))
+        self.failure.map_or(Ok(end), |full| Err(full.into()))
     }
 }
 
@@ -147,8 +160,8 @@ impl Executor for PipelineExecutor {
         }
         self.outside.begin(self.frame);
         while self.frame < end {
-            self.run(end - self.frame, renderer, on_frame)?;
-            if self.frame < end {
+            self.team.grow(self.pool.threads())?;
+            if self.run(end - self.frame, renderer, on_frame)? == End::Contacts {
                 self.tables.double_contacts();
             }
         }

@@ -1,6 +1,5 @@
 //! Frames run with the same tables: batches, and the threads that work on them.
 
-use std::io;
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard};
 use std::thread;
 
@@ -12,6 +11,7 @@ use dualframe_core::worker::Step;
 
 use super::clock::StageClock;
 use super::host::{Host, Parcel, Screen, Shared};
+use super::team::Team;
 use crate::blocking::{Blocking, FRAMES_PER_BLOCKING};
 use crate::executor::StageSeconds;
 use crate::pool::{Crew, Pool};
@@ -23,6 +23,17 @@ type SimPipeline<'m, 's> = Pipeline<'m, Host<'s>, &'s Crew>;
 pub(super) struct Report {
     pub(super) seconds: Vec<StageSeconds>,
     pub(super) failure: Option<TableFull>,
+}
+
+/// Why a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum End {
+    /// All frames are done, or a table failed.
+    Done,
+    /// The table of contacts is to grow.
+    Contacts,
+    /// More threads are wanted than there are.
+    Threads,
 }
 
 /// What is done between two batches.
@@ -56,6 +67,13 @@ impl Regrouping<'_> {
         pipeline.take_letters(|_, from, parcel| self.mail.push((from, parcel)));
     }
 
+    /// Gives the blocks the homes that they were dealt to.
+    fn settle(&self, pipeline: &mut SimPipeline<'_, '_>) {
+        if let Some(blocking) = self.blocking.as_deref() {
+            pipeline.set_homes(|unit| blocking.home(unit.index()));
+        }
+    }
+
     /// Forms the blocks anew from where their objects are.
     fn regroup(
         &mut self,
@@ -70,7 +88,7 @@ impl Regrouping<'_> {
             blocking.fill(index, &mut unit.block);
             shared.locate(index, &unit.block);
         }
-        pipeline.set_homes(|unit| blocking.home(unit.index()));
+        self.settle(pipeline);
         self.take_mail(pipeline);
         self.post_mail(shared, pipeline)
     }
@@ -94,69 +112,78 @@ pub(super) struct Context<'s, 'x> {
     pub(super) shared: &'s Shared<'s>,
     pub(super) crew: &'s Crew,
     pub(super) pool: &'x Pool,
+    pub(super) team: &'x Team,
     pub(super) report: &'x Mutex<Report>,
     pub(super) timeline: Option<&'x Timeline>,
 }
 
 impl<'s> Context<'s, '_> {
-    /// Runs batch after batch until all frames are done, a table fails, or the tables are to
-    /// grow; says how many frames were done.
-    ///
-    /// # Errors
-    /// The system gave no thread. The frames done until then are done.
+    /// Runs batch after batch until all frames are done, a table fails, or tables or team are to grow;
+    /// says how many frames were done.
     pub(super) fn run(
         self,
         frames: u64,
         mut pipeline: SimPipeline<'_, 's>,
         mut regrouping: Regrouping<'_>,
-        mut screen: Screen<'s>,
-    ) -> (u64, io::Result<()>) {
+        screen: Screen<'s>,
+    ) -> (u64, End) {
         for (index, unit) in pipeline.objects_mut().enumerate() {
             self.shared.locate(index, &unit.block);
         }
-        let mut outcome = regrouping.post_mail(self.shared, &pipeline);
-        let pipeline = RwLock::new(pipeline);
-        let (mut done, mut hiring) = (0, Ok(()));
-        thread::scope(|scope| {
-            let _dismissal = Dismissal(self.crew);
-            let host = Host::new(self.shared);
-            let mut hired = 1;
-            while done < frames && outcome.is_ok() {
-                // Threads beyond the number wanted wait; more are hired as they are asked for.
-                while hired < self.pool.threads() {
-                    let (index, pipeline) = (hired, &pipeline);
-                    let attend = move || self.attend(index, pipeline);
-                    if let Err(error) = thread::Builder::new().spawn_scoped(scope, attend) {
-                        hiring = Err(error);
-                        return;
-                    }
-                    hired += 1;
-                }
-                self.crew.await_present(hired - 1);
-                self.make_room_for(hired);
-                let batch = FRAMES_PER_BLOCKING.min(frames - done);
-                let Ok(mut resting) = pipeline.write() else { break };
-                if done > 0 {
-                    if resting.high_water().1 > regrouping.most_contacts {
-                        break;
-                    }
-                    outcome = regrouping.regroup(self.shared, &mut resting);
-                }
-                if outcome.is_err() || resting.run(batch as u32).is_err() {
-                    break;
-                }
-                drop(resting);
-                self.crew.start();
-                screen = self.lead(&read(&pipeline), &host, screen);
-                outcome = self.failure().map_or(Ok(()), Err);
-                done += batch;
-            }
-        });
-        if let Err(full) = outcome {
+        regrouping.settle(&mut pipeline);
+        if let Err(full) = regrouping.post_mail(self.shared, &pipeline) {
             self.fail(full);
         }
+        let pipeline = RwLock::new(pipeline);
+        let attend = |index| self.attend(index, &pipeline);
+        let batches = || self.batches(frames, &pipeline, &mut regrouping, screen);
+        let (done, end) = self.team.work(attend, batches);
         regrouping.take_mail(&mut pipeline.into_inner().unwrap_or_else(PoisonError::into_inner));
-        (done, hiring)
+        (done, end)
+    }
+
+    /// What the calling thread does while the others attend.
+    fn batches(
+        self,
+        frames: u64,
+        pipeline: &RwLock<SimPipeline<'_, 's>>,
+        regrouping: &mut Regrouping<'_>,
+        mut screen: Screen<'s>,
+    ) -> (u64, End) {
+        let dismissal = Dismissal(self.crew);
+        let host = Host::new(self.shared, self.team.take_own(0));
+        self.crew.await_present(self.team.workers() - 1, self.pool);
+        self.make_room_for(self.team.workers());
+        let (mut done, mut end) = (0, End::Done);
+        while done < frames && self.failure().is_none() {
+            if self.pool.threads() > self.team.workers() {
+                end = End::Threads;
+                break;
+            }
+            let batch = FRAMES_PER_BLOCKING.min(frames - done);
+            let Ok(mut resting) = pipeline.write() else { break };
+            if done > 0 {
+                if resting.high_water().1 > regrouping.most_contacts {
+                    end = End::Contacts;
+                    break;
+                }
+                if let Err(full) = regrouping.regroup(self.shared, &mut resting) {
+                    self.fail(full);
+                    break;
+                }
+            }
+            if resting.run(batch as u32).is_err() {
+                break;
+            }
+            drop(resting);
+            self.crew.start();
+            screen = self.lead(&read(pipeline), &host, screen);
+            done += batch;
+        }
+        self.team.give_own(0, host.into_own());
+        drop(dismissal);
+        self.crew.see_off(self.pool);
+        (done, end)
     }
 
     /// The calling thread's part in a batch: it alone renders.
@@ -181,7 +208,7 @@ impl<'s> Context<'s, '_> {
     /// A hired thread's life.
     fn attend(self, index: usize, pipeline: &RwLock<SimPipeline<'_, 's>>) {
         self.pool.pin(index);
-        let host = Host::new(self.shared);
+        let host = Host::new(self.shared, self.team.take_own(index));
         self.crew.report();
         let mut last = 0;
         while let Some(run) = self.crew.await_run(last, self.pool, index) {
@@ -193,6 +220,8 @@ impl<'s> Context<'s, '_> {
                 last = run;
             }
         }
+        self.team.give_own(index, host.into_own());
+        self.crew.leave();
     }
 
     /// Steps until the batch is done, or until this worker is not wanted any more.
