@@ -1,17 +1,24 @@
-//! How the time of a frame grows with the number of objects, at equal density.
+//! How the time of a frame grows with the number of objects, at equal density: all environments have
+//! filled their rooms before the clock starts.
 #![forbid(unsafe_code)]
 
 mod common;
 
+use std::cell::Cell;
 use std::process::ExitCode;
+use std::time::Instant;
 
 use dualframe_sim::experiment::calibrator::Calibrator;
 use dualframe_sim::experiment::error::ExperimentError;
-use dualframe_sim::experiment::load::RenderLoad;
-use dualframe_sim::experiment::race::{Race, Runner, WARM_UP};
+use dualframe_sim::experiment::race::Runner;
 use dualframe_sim::experiment::subject::Subject;
 use dualframe_sim::experiment::timing::{Contender, Series};
+use dualframe_sim::render::NullRenderer;
 use dualframe_sim::scene::ParticleScene;
+
+/// Frames until particles that start close together are everywhere; usually 1,200, when 1,000 and
+/// 10,000 particles collide equally often.
+const FILLING: u64 = 1_200;
 
 fn main() -> ExitCode {
     common::main(density)
@@ -22,18 +29,50 @@ fn density(arguments: &common::Arguments) -> Result<(), ExperimentError> {
     let calibrator = Calibrator::default();
     for runner in [Runner::SERIAL, Runner::pipeline(arguments.threads)] {
         let sizes = arguments.objects_or(&[1_000, 2_000, 5_000, 10_000]);
-        let contender = |&objects: &usize| {
+        let counts: Vec<Cell<Count>> = sizes.iter().map(|_| Cell::default()).collect();
+        let mut contenders = Vec::new();
+        for (&objects, count) in sizes.iter().zip(&counts) {
             let frames = arguments.frames_for(objects, 40_000);
-            let (scene, load) = (ParticleScene::new(objects), RenderLoad::Null);
-            let subject = Subject::Particles(scene);
-            let race = Race { subject, load, warm_up: WARM_UP, frames, rounds: 1 };
-            let run = move || Ok(race.seconds(runner)? / frames as f64);
-            Contender { label: objects.to_string(), spins: false, run: Box::new(run) }
-        };
-        let mut contenders: Vec<Contender<'_>> = sizes.iter().map(contender).collect();
+            let filling = if arguments.test { 3 } else { FILLING };
+            contenders.push(environment(runner, objects, filling, frames, count)?);
+        }
         let mut phase = || calibrator.phase();
         let series = Series::measure(&mut contenders, arguments.rounds, &mut phase, &mut || ())?;
         common::print(&format!("{}, by numbers of objects", runner.label()), &series, 1.0);
+        for (objects, count) in sizes.iter().zip(&counts) {
+            let Count { collisions, frames } = count.get();
+            let each = collisions as f64 / frames as f64 / *objects as f64;
+            println!("{objects:<24}{each:10.3} collisions of an object a frame");
+        }
     }
     Ok(())
+}
+
+/// What was counted while the clock ran.
+#[derive(Clone, Copy, Default)]
+struct Count {
+    collisions: u64,
+    frames: u64,
+}
+
+/// An environment that has filled its room, to be run on for so many frames each round.
+fn environment(
+    runner: Runner,
+    objects: usize,
+    filling: u64,
+    frames: u64,
+    count: &Cell<Count>,
+) -> Result<Contender<'_>, ExperimentError> {
+    let mut session = Subject::Particles(ParticleScene::new(objects)).start(runner)?;
+    session.run(filling, &mut NullRenderer::default(), &mut |_| ())?;
+    let run = move || {
+        let began = Instant::now();
+        session.run(frames, &mut NullRenderer::default(), &mut |record| {
+            let Count { collisions, frames } = count.get();
+            let collisions = collisions + record.pairs.collisions;
+            count.set(Count { collisions, frames: frames + 1 });
+        })?;
+        Ok(began.elapsed().as_secs_f64() / frames as f64)
+    };
+    Ok(Contender { label: objects.to_string(), spins: false, run: Box::new(run) })
 }
