@@ -36,7 +36,7 @@ fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
     for objects in arguments.objects_or(&hundreds) {
         let subject = Subject::Particles(ParticleScene::new(objects));
         for load in [RenderLoad::Null, RenderLoad::StandIn(StandIn::calibrated(&subject)?)] {
-            let frames = arguments.frames_for(objects, 20_000);
+            let frames = arguments.frames_for(objects, 60_000);
             let (subject, rounds) = (subject.clone(), arguments.rounds);
             let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };
             let outcome = race.run(&runners, &mut || calibrator.phase(), &mut || ())?;

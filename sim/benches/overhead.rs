@@ -25,7 +25,7 @@ fn overhead(arguments: &common::Arguments) -> Result<(), ExperimentError> {
             subject: Subject::Particles(ParticleScene::new(objects)),
             load: RenderLoad::Null,
             warm_up: WARM_UP,
-            frames: arguments.frames_for(objects, 20_000),
+            frames: arguments.frames_for(objects, 60_000),
             rounds: arguments.rounds,
         };
         let outcome = race.run(

@@ -33,7 +33,7 @@ fn uneven(arguments: &common::Arguments) -> Result<(), ExperimentError> {
         for seed in 1..=if arguments.test { 1 } else { SEEDS } {
             let scene =
                 ParticleScene { seed, most_substeps: MOST_SUBSTEPS, ..ParticleScene::new(objects) };
-            let frames = arguments.frames_for(objects, 4_000);
+            let frames = arguments.frames_for(objects, 15_000);
             let (load, rounds) = (RenderLoad::Null, arguments.rounds);
             let subject = Subject::Particles(scene);
             let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };

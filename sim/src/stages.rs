@@ -11,6 +11,7 @@ use glam::Vec3;
 
 use crate::behavior::{Gathered, Input, Segment, SpringWork, Workspace, batch};
 use crate::block::Block;
+use crate::geometry::Mesh;
 use crate::interaction::{Contact, ContactSink, PairScratch, Rules, Scratch, TableFull};
 use crate::message::Message;
 use crate::object::{Drawing, Fault, FaultKind, Object, ObjectId};
@@ -143,7 +144,14 @@ impl Stages {
         post: &mut dyn FnMut(ObjectId, ObjectId, Message),
     ) {
         let began = frame.is_multiple_of(FRAMES_PER_TIMING).then(Instant::now);
-        let Workspace { gathered: Gathered { records, segments }, springs } = workspace;
+        let Workspace { gathered: Gathered { records, segments }, springs, fetches } = workspace;
+        if *fetches {
+            block
+                .objects
+                .iter()
+                .filter_map(|object| object.geometry.as_mesh())
+                .for_each(Mesh::fetch);
+        }
         segments.sort_unstable_by_key(|segment| (segment.object, segment.other));
         let mut rest = segments.as_slice();
         for (place, object) in block.objects.iter_mut().enumerate() {

@@ -14,7 +14,7 @@ pub(crate) struct Arguments {
     /// Rounds of each race.
     #[arg(long, value_name = "N", default_value_t = 15)]
     pub(crate) rounds: usize,
-    /// Frames of each run; by default about as many as take 50 ms on one thread.
+    /// Frames of each run; by default about as many as take 150 ms on one thread.
     #[arg(long, value_name = "N")]
     pub(crate) frames: Option<u64>,
     /// Numbers of particles.
