@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::bounds::Bounds;
 use super::mesh::Mesh;
 use super::vectors::{LANES, Lanes};
-use crate::simd::{Isa, Kernel, first_lanes, fold_by};
+use crate::simd::{Isa, Kernel, first_lanes, greatest, least};
 
 /// Where a geometry is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,22 +73,6 @@ impl Kernel for Measure<'_> {
 #[inline(always)]
 fn hidden_after(count: usize) -> &'static Lanes {
     HIDDEN[LANES - count.min(LANES)..].first_chunk().unwrap_or_else(|| unreachable!("two chunks"))
-}
-
-/// The least number of a vector that has no NaN.
-#[inline(always)]
-pub(crate) fn least<I: Isa>(isa: I, vector: I::Vector) -> f32 {
-    let mut lanes = [0.0; LANES];
-    isa.store(vector, &mut lanes);
-    fold_by(lanes, |a, b| if a < b { a } else { b })
-}
-
-/// The greatest number of a vector that has no NaN.
-#[inline(always)]
-pub(crate) fn greatest<I: Isa>(isa: I, vector: I::Vector) -> f32 {
-    let mut lanes = [0.0; LANES];
-    isa.store(vector, &mut lanes);
-    fold_by(lanes, |a, b| if a > b { a } else { b })
 }
 
 #[cfg(test)]

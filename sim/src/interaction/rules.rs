@@ -83,7 +83,10 @@ impl Rules {
 
     /// Whether there is a rule for any group of the one set and any of the other.
     pub(crate) fn apply(&self, a: u32, b: u32) -> bool {
-        set_bits(a).any(|group| self.partners[group] & b != 0)
+        self.partners
+            .iter()
+            .enumerate()
+            .any(|(group, partners)| a >> group & 1 == 1 && partners & b != 0)
     }
 
     /// For each group a bit for every group that it has a rule with.
@@ -108,15 +111,6 @@ impl Rules {
             }
         })
     }
-}
-
-/// The places of a word's set bits.
-fn set_bits(mut word: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let bit = (word != 0).then(|| word.trailing_zeros() as usize);
-        word &= word.wrapping_sub(1);
-        bit
-    })
 }
 
 /// The set of one group. Groups past the last belong to no set.

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use crate::geometry::{Bounds, LANES, Lanes, Mesh, greatest, least};
-use crate::simd::{Isa, LaneSet, Simd, first_lanes};
+use crate::geometry::{Bounds, LANES, Lanes, Mesh};
+use crate::simd::{Isa, LaneSet, Simd, first_lanes, greatest, least};
 
 /// A place where two objects touch.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -270,7 +270,7 @@ pub(crate) fn fold(lanes: Lanes) -> f32 {
 
 /// Lanes made into one number: the lower half is joined with the upper half until one is left.
 #[inline(always)]
-pub(crate) fn fold_by(mut lanes: Lanes, join: impl Fn(f32, f32) -> f32) -> f32 {
+fn fold_by(mut lanes: Lanes, join: impl Fn(f32, f32) -> f32) -> f32 {
     let mut half = LANES / 2;
     while half > 0 {
         for lane in 0..half {
@@ -279,4 +279,20 @@ pub(crate) fn fold_by(mut lanes: Lanes, join: impl Fn(f32, f32) -> f32) -> f32 {
         half /= 2;
     }
     lanes[0]
+}
+
+/// The least number of a vector that has no NaN.
+#[inline(always)]
+pub(crate) fn least<I: Isa>(isa: I, vector: I::Vector) -> f32 {
+    let mut lanes = [0.0; LANES];
+    isa.store(vector, &mut lanes);
+    fold_by(lanes, |a, b| if a < b { a } else { b })
+}
+
+/// The greatest number of a vector that has no NaN.
+#[inline(always)]
+pub(crate) fn greatest<I: Isa>(isa: I, vector: I::Vector) -> f32 {
+    let mut lanes = [0.0; LANES];
+    isa.store(vector, &mut lanes);
+    fold_by(lanes, |a, b| if a > b { a } else { b })
 }
