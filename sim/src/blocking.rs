@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use crate::block::Block;
 use crate::object::Object;
+use crate::simd::HALF;
 
 /// How objects are grouped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,14 +43,13 @@ pub enum BlockingError {
 /// The frames between two regroupings: in so many a particle moves by a fraction of a block.
 pub const FRAMES_PER_BLOCKING: u64 = 32;
 
-/// Objects a block where there are few objects.
-const OBJECTS_PER_BLOCK: usize = 16;
-/// Objects a block where there are so many that [`BLOCKS`] would not do.
-const OBJECTS_PER_LARGE_BLOCK: usize = 40;
-/// The number of blocks up to which they hold [`OBJECTS_PER_BLOCK`] objects, and of objects up to which
-/// blocks hold one.
-const BLOCKS: usize = 64;
-/// The fewest blocks for each worker.
+/// The most objects of a block. In larger ones less of the time goes to pairs of blocks, and more to objects
+/// that are nowhere near each other.
+const OBJECTS_PER_BLOCK: usize = 40;
+/// Objects up to which each is a block of its own: few objects are heavy or uneven ones, and blocks of them
+/// would be too.
+const SINGLE_OBJECTS: usize = 64;
+/// The fewest blocks for each worker, where there are objects enough.
 const BLOCKS_PER_WORKER: usize = 4;
 
 /// Groups objects into a number of blocks that stays the same; which objects are together changes.
@@ -62,8 +62,8 @@ pub struct Blocking {
     members: Vec<Members>,
     keys: Vec<Key>,
     moving_blocks: usize,
-    /// Room for objects in every block of moving ones: which of them has one more changes.
-    room: usize,
+    /// How many moving objects a block holds; the last one may hold fewer.
+    size: usize,
 }
 
 /// Who is in a block.
@@ -134,27 +134,27 @@ impl Blocking {
             kinds[kind(object)].push(object.id().0);
         }
         let [moving, scenery, solitary] = kinds;
-        let (moving_blocks, scenery_blocks, solitary_blocks) = match grain {
-            Grain::Pairwise => (moving.len(), scenery.len(), solitary.len()),
-            Grain::Spatial => (
-                block_count(moving.len(), workers),
-                scenery.len().min(1),
-                block_count(solitary.len(), workers),
-            ),
+        let block_size = |objects: usize| match grain {
+            Grain::Pairwise => 1,
+            Grain::Spatial => block_size(objects, workers),
         };
-        let room = moving.len().div_ceil(moving_blocks.max(1)) + 1;
-        let empty = || Members { ids: Vec::with_capacity(room), ..Members::default() };
+        let size = block_size(moving.len());
+        let of_scenery = match grain {
+            Grain::Pairwise => 1,
+            Grain::Spatial => scenery.len().max(1),
+        };
+        let moving_blocks = moving.len().div_ceil(size);
+        let empty = || Members { ids: Vec::with_capacity(size), ..Members::default() };
         let mut members = Vec::new();
         members.resize_with(moving_blocks, empty);
-        for (ids, blocks) in [(scenery, scenery_blocks), (solitary, solitary_blocks)] {
-            let size = ids.len().div_ceil(blocks.max(1)).max(1);
+        for (ids, size) in [(&scenery, of_scenery), (&solitary, block_size(solitary.len()))] {
             let chunks = ids.chunks(size);
             members.extend(chunks.map(|ids| Members { ids: ids.to_vec(), ..Members::default() }));
         }
         let mut blocks = Vec::new();
         blocks.resize_with(members.len(), Block::default);
         let keys = Vec::with_capacity(moving.len());
-        let mut blocking = Self { objects, members, keys, moving_blocks, room };
+        let mut blocking = Self { objects, members, keys, moving_blocks, size };
         blocking.split();
         for (index, block) in blocks.iter_mut().enumerate() {
             blocking.fill(index, block);
@@ -176,7 +176,7 @@ impl Blocking {
         self.keys.clear();
         let moving = self.objects.iter().flatten().filter(|object| kind(object) == MOVING);
         self.keys.extend(moving.map(Key::new));
-        split(&mut self.keys, &mut self.members[..self.moving_blocks]);
+        split(&mut self.keys, &mut self.members[..self.moving_blocks], self.size);
     }
 
     /// Shares the moving objects' blocks out to so many homes, for a [`split`](Self::split) that is to be
@@ -208,8 +208,8 @@ impl Blocking {
     /// Puts the objects of the block number `index` into it.
     pub fn fill(&mut self, index: usize, block: &mut Block) {
         let Some(Members { ids, .. }) = self.members.get(index) else { return };
-        let room = ids.len().max(self.room);
-        block.objects.reserve(room);
+        // Which block is the one with fewer objects changes.
+        block.objects.reserve(ids.len().max(self.size));
         for &id in ids {
             block.objects.extend(self.objects.get_mut(id as usize).and_then(Option::take));
         }
@@ -227,15 +227,14 @@ fn kind(object: &Object) -> usize {
     }
 }
 
-/// The number of blocks for so many objects. Where there are few, each is a block of its own: few
-/// objects are heavy or uneven ones, and blocks of them would be too.
-fn block_count(objects: usize, workers: usize) -> usize {
-    if objects <= BLOCKS {
-        return objects;
+/// How many of so many objects a block holds. All blocks but the last hold just as many, a multiple of the bodies
+/// that are advanced side by side: fewer of them take as long.
+fn block_size(objects: usize, workers: usize) -> usize {
+    if objects <= SINGLE_OBJECTS {
+        return 1;
     }
-    let few = objects.div_ceil(OBJECTS_PER_BLOCK).min(BLOCKS);
-    let wanted = few.max(BLOCKS_PER_WORKER * workers).max(objects / OBJECTS_PER_LARGE_BLOCK);
-    wanted.min(objects)
+    let share = objects / (BLOCKS_PER_WORKER * workers.max(1));
+    ((share + HALF / 2) / HALF * HALF).clamp(HALF, OBJECTS_PER_BLOCK)
 }
 
 impl Key {
@@ -244,8 +243,9 @@ impl Key {
     }
 }
 
-/// Shares the objects out evenly: halves along the longest side until each part is one block.
-fn split(keys: &mut [Key], members: &mut [Members]) {
+/// Shares the objects out, `size` to each block but the last: halves along the longest side until each part
+/// is one block.
+fn split(keys: &mut [Key], members: &mut [Members], size: usize) {
     match members {
         [] => {}
         [only] => {
@@ -256,17 +256,15 @@ fn split(keys: &mut [Key], members: &mut [Members]) {
         }
         _ => {
             let half = members.len() / 2;
-            let middle = keys.len() * half / members.len();
-            if middle < keys.len() {
-                let axis = longest_side(keys);
-                keys.select_nth_unstable_by(middle, |a, b| {
-                    a.center[axis].total_cmp(&b.center[axis]).then(a.id.cmp(&b.id))
-                });
-            }
+            let middle = half * size;
+            let axis = longest_side(keys);
+            keys.select_nth_unstable_by(middle, |a, b| {
+                a.center[axis].total_cmp(&b.center[axis]).then(a.id.cmp(&b.id))
+            });
             let (low, high) = keys.split_at_mut(middle);
             let (low_members, high_members) = members.split_at_mut(half);
-            split(low, low_members);
-            split(high, high_members);
+            split(low, low_members, size);
+            split(high, high_members, size);
         }
     }
 }

@@ -18,21 +18,25 @@ fn blocks(objects: Vec<Object>, grain: Grain, workers: usize) -> Vec<Block> {
 
 #[test]
 fn number_and_size_of_blocks() {
-    // Particles, workers, blocks of particles; one block of walls comes on top.
-    for (objects, workers, expected) in [
+    // Particles, workers, particles a block; one block of walls comes on top.
+    for (objects, workers, size) in [
         (1, 4, 1),
-        (10, 1, 10),
-        (100, 1, 7),
-        (300, 1, 19),
-        (300, 8, 32),
-        (1_000, 2, 63),
-        (4_000, 2, 100),
+        (64, 1, 1),
+        (65, 1, 16),
+        (100, 1, 24),
+        (100, 2, 16),
+        (300, 1, 40),
+        (300, 8, 8),
+        (300, 64, 8),
+        (1_000, 2, 40),
+        (4_000, 16, 40),
     ] {
         let blocks = blocks(particles(objects, false, true).objects, Grain::Spatial, workers);
-        assert_eq!(blocks.len(), expected + 1, "{objects} particles, {workers} workers");
-        let sizes = blocks[..expected].iter().map(|block| block.objects().len());
-        let (least, most) = sizes.fold((usize::MAX, 0), |(l, m), size| (l.min(size), m.max(size)));
-        assert!(most - least <= 1, "{least} to {most} in a block");
+        let sizes: Vec<usize> = blocks.iter().map(|block| block.objects().len()).collect();
+        let last = objects - (objects - 1) / size * size;
+        let mut expected = vec![size; (objects - 1) / size];
+        expected.extend([last, 6]);
+        assert_eq!(sizes, expected, "{objects} particles, {workers} workers");
     }
     let pairwise = blocks(particles(30, false, true).objects, Grain::Pairwise, 4);
     assert_eq!(pairwise.len(), 36);
@@ -58,9 +62,9 @@ fn every_object_is_in_one_block_before_and_after_regrouping() {
 fn blocks_of_particles_are_compact() {
     let blocks = blocks(particles(1_000, false, true).objects, Grain::Spatial, 1);
     let side = |block: &Block| (block.bounds().max - block.bounds().min).max_element();
-    // Sixteen particles in a cube of the lattice need 0.7 m.
-    let widest = blocks[..63].iter().map(side).fold(0.0, f32::max);
-    assert!(widest < 1.2, "{widest} m");
+    // Forty particles in a cube of the lattice need 1 m.
+    let widest = blocks[..25].iter().map(side).fold(0.0, f32::max);
+    assert!(widest < 1.6, "{widest} m");
 }
 
 #[test]

@@ -208,3 +208,51 @@ impl Executor for PipelineExecutor {
         self.seconds.clone()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::NullRenderer;
+    use crate::scene::ParticleScene;
+
+    fn executor(scene: Scene) -> PipelineExecutor {
+        let pool = Arc::new(Pool::new(2, false));
+        PipelineExecutor::new(scene, Grain::Spatial, Entry::default(), pool).expect("a valid scene")
+    }
+
+    fn advance(executor: &mut PipelineExecutor, frames: u64) {
+        let advanced = executor.advance(frames, &mut NullRenderer::new(), &mut |_| ());
+        advanced.expect("the tables hold all");
+    }
+
+    #[test]
+    fn frames_run_one_by_one_are_regrouped_as_others() {
+        let grouped = |runs: u64, frames: u64| -> Vec<Vec<ObjectId>> {
+            let mut executor = executor(ParticleScene::new(200).build().expect("a valid scene"));
+            (0..runs).for_each(|_| advance(&mut executor, frames));
+            let numbers = |block: &Block| block.objects().iter().map(Object::id).collect();
+            let mut blocks: Vec<_> = executor.blocks.iter().map(numbers).collect();
+            // Homes are dealt by what updates took.
+            blocks.sort_unstable();
+            blocks
+        };
+        let regrouped = grouped(1, 65);
+        assert_eq!(grouped(65, 1), regrouped);
+        assert_eq!(grouped(13, 5), regrouped);
+        assert_ne!(grouped(1, 64), regrouped, "nobody moves from block to block");
+    }
+
+    #[test]
+    fn tables_grow_after_one_frame() {
+        let mut scene = ParticleScene::new(60).build().expect("a valid scene");
+        let first = scene.objects[0].geometry.as_mesh().expect("a particle").positions.clone();
+        for object in scene.objects.iter_mut().take(14) {
+            object.geometry.as_mesh_mut().expect("a particle").positions = first.clone();
+            object.refit();
+        }
+        let mut executor = executor(scene);
+        let before = executor.tables.contact_capacity();
+        advance(&mut executor, 1);
+        assert_eq!(executor.tables.contact_capacity(), 2 * before);
+    }
+}

@@ -12,8 +12,8 @@ use dualframe_core::worker::Step;
 use super::clock::StageClock;
 use super::host::{Host, Parcel, Screen, Shared};
 use super::team::Team;
-use crate::blocking::{Blocking, FRAMES_PER_BLOCKING};
-use crate::executor::StageSeconds;
+use crate::blocking::{Blocking, FRAMES_PER_BLOCKING, Grain};
+use crate::executor::{StageSeconds, world};
 use crate::pool::{Crew, Pool};
 use crate::timeline::Timeline;
 
@@ -74,13 +74,16 @@ impl Regrouping<'_> {
         }
     }
 
-    /// Forms the blocks anew from where their objects are.
-    fn regroup(
+    /// Forms the blocks anew from where their objects are, if that is due before a frame.
+    fn regroup_before(
         &mut self,
+        frame: u64,
         shared: &Shared<'_>,
         pipeline: &mut SimPipeline<'_, '_>,
     ) -> Result<(), TableFull> {
-        let Some(blocking) = self.blocking.as_deref_mut() else { return Ok(()) };
+        let due =
+            self.blocking.as_deref_mut().filter(|_| world::regroups_before(Grain::Spatial, frame));
+        let Some(blocking) = due else { return Ok(()) };
         pipeline.objects_mut().for_each(|unit| blocking.drain(&mut unit.block));
         blocking.split();
         blocking.deal(self.homes);
@@ -160,17 +163,12 @@ impl<'s> Context<'s, '_> {
                 end = End::Threads;
                 break;
             }
-            let batch = FRAMES_PER_BLOCKING.min(frames - done);
+            let frame = self.shared.first_frame + done;
+            let batch = (FRAMES_PER_BLOCKING - frame % FRAMES_PER_BLOCKING).min(frames - done);
             let Ok(mut resting) = pipeline.write() else { break };
-            if done > 0 {
-                if resting.high_water().1 > regrouping.most_contacts {
-                    end = End::Contacts;
-                    break;
-                }
-                if let Err(full) = regrouping.regroup(self.shared, &mut resting) {
-                    self.fail(full);
-                    break;
-                }
+            if let Err(full) = regrouping.regroup_before(frame, self.shared, &mut resting) {
+                self.fail(full);
+                break;
             }
             if resting.run(batch as u32).is_err() {
                 break;
@@ -179,6 +177,11 @@ impl<'s> Context<'s, '_> {
             self.crew.start();
             screen = self.lead(&read(pipeline), &host, screen);
             done += batch;
+            let Ok(mut rested) = pipeline.write() else { break };
+            if rested.high_water().1 > regrouping.most_contacts {
+                end = End::Contacts;
+                break;
+            }
         }
         self.team.give_own(0, host.into_own());
         drop(dismissal);
