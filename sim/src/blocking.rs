@@ -49,8 +49,8 @@ const OBJECTS_PER_BLOCK: usize = 40;
 /// Objects up to which each is a block of its own: few objects are heavy or uneven ones, and blocks of them
 /// would be too.
 const SINGLE_OBJECTS: usize = 64;
-/// The fewest blocks for each worker, where there are objects enough.
-const BLOCKS_PER_WORKER: usize = 4;
+/// The fewest blocks for each worker, where there are objects enough to fill the lanes of each.
+const BLOCKS_PER_WORKER: usize = 3;
 
 /// Groups objects into a number of blocks that stays the same; which objects are together changes.
 ///
@@ -62,8 +62,10 @@ pub struct Blocking {
     members: Vec<Members>,
     keys: Vec<Key>,
     moving_blocks: usize,
-    /// How many moving objects a block holds; the last one may hold fewer.
-    size: usize,
+    /// Moving objects are shared out so many at a time: as many as are advanced side by side, or one by one.
+    share: usize,
+    /// Room for objects in every block of moving ones: which of them has a share more changes.
+    room: usize,
 }
 
 /// Who is in a block.
@@ -134,27 +136,28 @@ impl Blocking {
             kinds[kind(object)].push(object.id().0);
         }
         let [moving, scenery, solitary] = kinds;
-        let block_size = |objects: usize| match grain {
-            Grain::Pairwise => 1,
-            Grain::Spatial => block_size(objects, workers),
+        let (moving_blocks, scenery_blocks, solitary_blocks) = match grain {
+            Grain::Pairwise => (moving.len(), scenery.len(), solitary.len()),
+            Grain::Spatial => (
+                block_count(moving.len(), workers),
+                scenery.len().min(1),
+                block_count(solitary.len(), workers),
+            ),
         };
-        let size = block_size(moving.len());
-        let of_scenery = match grain {
-            Grain::Pairwise => 1,
-            Grain::Spatial => scenery.len().max(1),
-        };
-        let moving_blocks = moving.len().div_ceil(size);
-        let empty = || Members { ids: Vec::with_capacity(size), ..Members::default() };
+        let share = if moving_blocks == moving.len() { 1 } else { HALF };
+        let room = moving.len().div_ceil(share).div_ceil(moving_blocks.max(1)) * share;
+        let empty = || Members { ids: Vec::with_capacity(room), ..Members::default() };
         let mut members = Vec::new();
         members.resize_with(moving_blocks, empty);
-        for (ids, size) in [(&scenery, of_scenery), (&solitary, block_size(solitary.len()))] {
+        for (ids, blocks) in [(scenery, scenery_blocks), (solitary, solitary_blocks)] {
+            let size = ids.len().div_ceil(blocks.max(1)).max(1);
             let chunks = ids.chunks(size);
             members.extend(chunks.map(|ids| Members { ids: ids.to_vec(), ..Members::default() }));
         }
         let mut blocks = Vec::new();
         blocks.resize_with(members.len(), Block::default);
         let keys = Vec::with_capacity(moving.len());
-        let mut blocking = Self { objects, members, keys, moving_blocks, size };
+        let mut blocking = Self { objects, members, keys, moving_blocks, share, room };
         blocking.split();
         for (index, block) in blocks.iter_mut().enumerate() {
             blocking.fill(index, block);
@@ -176,7 +179,7 @@ impl Blocking {
         self.keys.clear();
         let moving = self.objects.iter().flatten().filter(|object| kind(object) == MOVING);
         self.keys.extend(moving.map(Key::new));
-        split(&mut self.keys, &mut self.members[..self.moving_blocks], self.size);
+        split(&mut self.keys, &mut self.members[..self.moving_blocks], self.share);
     }
 
     /// Shares the moving objects' blocks out to so many homes, for a [`split`](Self::split) that is to be
@@ -208,8 +211,7 @@ impl Blocking {
     /// Puts the objects of the block number `index` into it.
     pub fn fill(&mut self, index: usize, block: &mut Block) {
         let Some(Members { ids, .. }) = self.members.get(index) else { return };
-        // Which block is the one with fewer objects changes.
-        block.objects.reserve(ids.len().max(self.size));
+        block.objects.reserve(ids.len().max(self.room));
         for &id in ids {
             block.objects.extend(self.objects.get_mut(id as usize).and_then(Option::take));
         }
@@ -227,14 +229,16 @@ fn kind(object: &Object) -> usize {
     }
 }
 
-/// How many of so many objects a block holds. All blocks but the last hold just as many, a multiple of the bodies
-/// that are advanced side by side: fewer of them take as long.
-fn block_size(objects: usize, workers: usize) -> usize {
+/// The number of blocks for so many objects. None is for fewer of them than are advanced side by side, which
+/// would take as long.
+fn block_count(objects: usize, workers: usize) -> usize {
     if objects <= SINGLE_OBJECTS {
-        return 1;
+        return objects;
     }
-    let share = objects / (BLOCKS_PER_WORKER * workers.max(1));
-    ((share + HALF / 2) / HALF * HALF).clamp(HALF, OBJECTS_PER_BLOCK)
+    let workers = workers.max(1);
+    // No worker is to have one more than another.
+    let wanted = objects.div_ceil(OBJECTS_PER_BLOCK).next_multiple_of(workers);
+    wanted.max(BLOCKS_PER_WORKER * workers).min(objects.div_ceil(HALF))
 }
 
 impl Key {
@@ -243,9 +247,9 @@ impl Key {
     }
 }
 
-/// Shares the objects out, `size` to each block but the last: halves along the longest side until each part
-/// is one block.
-fn split(keys: &mut [Key], members: &mut [Members], size: usize) {
+/// Shares the objects out evenly, `share` at a time: halves along the longest side until each part is one block.
+/// Every block gets a share; the last may be short of objects.
+fn split(keys: &mut [Key], members: &mut [Members], share: usize) {
     match members {
         [] => {}
         [only] => {
@@ -256,15 +260,15 @@ fn split(keys: &mut [Key], members: &mut [Members], size: usize) {
         }
         _ => {
             let half = members.len() / 2;
-            let middle = half * size;
+            let middle = keys.len().div_ceil(share) * half / members.len() * share;
             let axis = longest_side(keys);
             keys.select_nth_unstable_by(middle, |a, b| {
                 a.center[axis].total_cmp(&b.center[axis]).then(a.id.cmp(&b.id))
             });
             let (low, high) = keys.split_at_mut(middle);
             let (low_members, high_members) = members.split_at_mut(half);
-            split(low, low_members, size);
-            split(high, high_members, size);
+            split(low, low_members, share);
+            split(high, high_members, share);
         }
     }
 }

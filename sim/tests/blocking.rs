@@ -18,25 +18,29 @@ fn blocks(objects: Vec<Object>, grain: Grain, workers: usize) -> Vec<Block> {
 
 #[test]
 fn number_and_size_of_blocks() {
-    // Particles, workers, particles a block; one block of walls comes on top.
-    for (objects, workers, size) in [
+    // Particles, workers, blocks of particles; one block of walls comes on top.
+    for (objects, workers, expected) in [
         (1, 4, 1),
-        (64, 1, 1),
-        (65, 1, 16),
-        (100, 1, 24),
-        (100, 2, 16),
-        (300, 1, 40),
-        (300, 8, 8),
-        (300, 64, 8),
-        (1_000, 2, 40),
-        (4_000, 16, 40),
+        (64, 1, 64),
+        (65, 1, 3),
+        (100, 2, 6),
+        (300, 1, 8),
+        (300, 8, 24),
+        (300, 64, 38),
+        (1_000, 2, 26),
+        (4_000, 16, 112),
     ] {
         let blocks = blocks(particles(objects, false, true).objects, Grain::Spatial, workers);
-        let sizes: Vec<usize> = blocks.iter().map(|block| block.objects().len()).collect();
-        let last = objects - (objects - 1) / size * size;
-        let mut expected = vec![size; (objects - 1) / size];
-        expected.extend([last, 6]);
-        assert_eq!(sizes, expected, "{objects} particles, {workers} workers");
+        assert_eq!(blocks.len(), expected + 1, "{objects} particles, {workers} workers");
+        let sizes: Vec<usize> =
+            blocks[..expected].iter().map(|block| block.objects().len()).collect();
+        // Eight are advanced side by side; with fewer objects each is a block.
+        let share = if objects == expected { 1 } else { 8 };
+        let (last, whole) = sizes.split_last().expect("blocks");
+        assert!(whole.iter().all(|size| size % share == 0), "{sizes:?}");
+        let shares = sizes.iter().map(|size| size.div_ceil(share));
+        let (least, most) = (shares.clone().min().expect("blocks"), shares.max().expect("blocks"));
+        assert!(*last > 0 && most - least <= 1, "{sizes:?}");
     }
     let pairwise = blocks(particles(30, false, true).objects, Grain::Pairwise, 4);
     assert_eq!(pairwise.len(), 36);
