@@ -11,6 +11,12 @@ pub struct Bounds {
     pub max: Vec3,
 }
 
+impl Default for Bounds {
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
 impl Bounds {
     /// The box of nothing: it overlaps no box, and is the neutral element of [`Bounds::union`].
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
@@ -29,6 +35,11 @@ impl Bounds {
     #[must_use]
     pub fn union(&self, other: &Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// Its least and its greatest coordinates.
+    pub(crate) fn corners(&self) -> [[f32; 3]; 2] {
+        [self.min.to_array(), self.max.to_array()]
     }
 
     /// This box grown by `margin` metres on every side.
