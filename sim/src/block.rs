@@ -37,6 +37,7 @@ impl Block {
 
     /// The box around all its objects that may interact.
     #[must_use]
+    #[inline]
     pub fn bounds(&self) -> Bounds {
         self.bounds
     }

@@ -56,8 +56,14 @@ pub struct Stages {
 impl Stages {
     /// Whether objects of two blocks may touch.
     #[must_use]
+    #[inline]
     pub fn broad_phase(&self, a: &Block, b: &Block) -> bool {
-        if !a.bounds().overlaps(&b.bounds()) || !self.rules.apply(a.groups(), b.groups()) {
+        a.bounds().overlaps(&b.bounds()) && self.objects_reach(a, b)
+    }
+
+    /// Whether objects of two blocks that overlap may touch.
+    fn objects_reach(&self, a: &Block, b: &Block) -> bool {
+        if !self.rules.apply(a.groups(), b.groups()) {
             return false;
         }
         // The box around walls says nothing, but each of them has one; and so has each object that is to
