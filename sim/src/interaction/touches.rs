@@ -1,5 +1,6 @@
 //! The results module of an interaction pair (Fig. 3): what detection found.
 
+use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 use glam::Vec3;
 
 use crate::geometry::{Bounds, LANES, Lanes, Mesh};
@@ -59,11 +60,16 @@ impl Touches {
     }
 }
 
+/// [`Lanes`] in a cache line of their own: every load across two lines would take longer.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C, align(64))]
+struct Line(Lanes);
+
 /// The nodes of a mesh that are in reach of another object.
 #[derive(Debug, Default)]
 pub(super) struct NearNodes {
     nodes: Vec<u32>,
-    components: [Vec<f32>; 3],
+    components: [Vec<Line>; 3],
     len: usize,
 }
 
@@ -86,7 +92,7 @@ impl NearNodes {
                 inside &= isa.at_most(vectors[axis], isa.splat(max[axis]));
             }
             if inside != 0 {
-                let [x, y, z] = self.components.each_mut();
+                let [x, y, z] = self.components.each_mut().map(|lines| cast_slice_mut(lines));
                 let to = [lanes_at(x, len), lanes_at(y, len), lanes_at(z, len)];
                 isa.compress(inside, first as u32, vectors, lanes_at(&mut self.nodes, len), to);
                 len += inside.count_ones() as usize;
@@ -95,8 +101,9 @@ impl NearNodes {
         self.len = len;
         // Room for whole lanes, which hold the last node once more: no box grows by it.
         for component in &mut self.components {
-            if let Some(&last) = component[..len].last() {
-                component[len..len + LANES].fill(last);
+            let numbers: &mut [f32] = cast_slice_mut(component);
+            if let Some(&last) = numbers[..len].last() {
+                numbers[len..len + LANES].fill(last);
             }
         }
     }
@@ -108,15 +115,15 @@ impl NearNodes {
 
     /// The position of the node at `index` of [`NearNodes::nodes`], in metres.
     pub(super) fn position(&self, index: usize) -> [f32; 3] {
-        self.components.each_ref().map(|component| component[index])
+        self.components.each_ref().map(|component| cast_slice(component)[index])
     }
 
     /// The positions in whole lanes, and in which there are nodes.
     #[inline(always)]
     pub(super) fn chunks(&self) -> impl Iterator<Item = ([&Lanes; 3], LaneSet)> + '_ {
-        let [x, y, z] = self.components.each_ref().map(|c| c.as_chunks::<LANES>().0);
+        let [x, y, z] = self.components.each_ref();
         let there = (0..self.len).step_by(LANES).map(|first| first_lanes(self.len - first));
-        x.iter().zip(y).zip(z).map(|((x, y), z)| [x, y, z]).zip(there)
+        x.iter().zip(y).zip(z).map(|((x, y), z)| [&x.0, &y.0, &z.0]).zip(there)
     }
 
     /// The box around the nodes.
@@ -140,11 +147,11 @@ impl NearNodes {
     /// Makes room for the nodes of so many chunks.
     pub(super) fn reserve(&mut self, chunks: usize) {
         // One more than can be kept: whole lanes are written wherever the last one ended.
-        let wanted = (chunks + 1) * LANES;
-        if self.nodes.len() < wanted {
-            self.nodes.resize(wanted, 0);
+        let wanted = chunks + 1;
+        if self.nodes.len() < wanted * LANES {
+            self.nodes.resize(wanted * LANES, 0);
             for component in &mut self.components {
-                component.resize(wanted, 0.0);
+                component.resize(wanted, Line::default());
             }
         }
     }
