@@ -261,10 +261,13 @@ fn split(keys: &mut [Key], members: &mut [Members], share: usize) {
         _ => {
             let half = members.len() / 2;
             let middle = keys.len().div_ceil(share) * half / members.len() * share;
-            let axis = longest_side(keys);
-            keys.select_nth_unstable_by(middle, |a, b| {
-                a.center[axis].total_cmp(&b.center[axis]).then(a.id.cmp(&b.id))
-            });
+            // Blocks that were not drained leave fewer objects than there is room for.
+            if middle < keys.len() {
+                let axis = longest_side(keys);
+                keys.select_nth_unstable_by(middle, |a, b| {
+                    a.center[axis].total_cmp(&b.center[axis]).then(a.id.cmp(&b.id))
+                });
+            }
             let (low, high) = keys.split_at_mut(middle);
             let (low_members, high_members) = members.split_at_mut(half);
             split(low, low_members, share);

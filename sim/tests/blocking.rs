@@ -63,6 +63,19 @@ fn every_object_is_in_one_block_before_and_after_regrouping() {
 }
 
 #[test]
+fn blocks_that_were_not_drained_keep_their_objects() {
+    let objects = particles(300, false, true).objects;
+    let (mut blocking, mut blocks) =
+        Blocking::new(objects, Grain::Spatial, 2).expect("particles are well formed");
+    let kept = numbers(&blocks[0]);
+    for drained in [0, 1] {
+        blocks.iter_mut().skip(1).take(drained).for_each(|block| blocking.drain(block));
+        blocking.split();
+        assert_eq!(numbers(&blocks[0]), kept);
+    }
+}
+
+#[test]
 fn blocks_of_particles_are_compact() {
     let blocks = blocks(particles(1_000, false, true).objects, Grain::Spatial, 1);
     let side = |block: &Block| (block.bounds().max - block.bounds().min).max_element();
