@@ -47,6 +47,14 @@ impl Block {
         self.groups
     }
 
+    /// Makes room for so many objects in an empty block.
+    pub(crate) fn reserve(&mut self, objects: usize) {
+        self.objects.reserve(objects);
+        self.ids.clear();
+        self.ids.reserve(objects);
+        self.boxes.reserve(objects);
+    }
+
     /// Brings numbers, boxes and groups up to date with the objects.
     pub(crate) fn refresh(&mut self) {
         self.ids.clear();
@@ -137,6 +145,11 @@ impl Boxes {
             self.chunks.resize(len.div_ceil(LANES), BoxLanes::EMPTY);
             self.len = len;
         }
+    }
+
+    /// Makes room for so many boxes in all.
+    fn reserve(&mut self, len: usize) {
+        self.chunks.reserve(len.div_ceil(LANES).saturating_sub(self.chunks.len()));
     }
 
     fn set(&mut self, place: usize, bounds: &Bounds) {

@@ -211,7 +211,7 @@ impl Blocking {
     /// Puts the objects of the block number `index` into it.
     pub fn fill(&mut self, index: usize, block: &mut Block) {
         let Some(Members { ids, .. }) = self.members.get(index) else { return };
-        block.objects.reserve(ids.len().max(self.room));
+        block.reserve(ids.len().max(self.room));
         for &id in ids {
             block.objects.extend(self.objects.get_mut(id as usize).and_then(Option::take));
         }
