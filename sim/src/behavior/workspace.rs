@@ -79,6 +79,11 @@ impl Room {
         }
         room
     }
+
+    /// Contact records of one block in one frame, also those within it.
+    pub(crate) fn contacts(&self) -> usize {
+        self.objects * CONTACTS_PER_OBJECT
+    }
 }
 
 impl Workspace {
@@ -86,7 +91,7 @@ impl Workspace {
     pub(crate) fn with_room(room: Room) -> Self {
         let mut workspace = Self { fetches: room.state > CACHED, ..Self::default() };
         let Self { gathered: Gathered { records, segments }, springs, .. } = &mut workspace;
-        records.reserve(room.objects * CONTACTS_PER_OBJECT);
+        records.reserve(room.contacts());
         segments.reserve(room.objects * TOUCHED_PER_OBJECT);
         springs.waiting.reserve(room.objects);
         springs.alone.reserve(room.nodes);

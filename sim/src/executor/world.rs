@@ -17,7 +17,7 @@ use crate::scene::Scene;
 use crate::stages::{PairCount, Stages};
 
 /// Records that a candidate's buffer holds before it has to grow.
-pub(super) const RECORDS_PER_CANDIDATE: usize = 512;
+const RECORDS_PER_CANDIDATE: usize = 512;
 /// Candidates with a buffer from the start, for each block: itself and its neighbours in a grid, of
 /// which each pair counts once, and some walls.
 const CANDIDATES_PER_BLOCK: usize = 16;

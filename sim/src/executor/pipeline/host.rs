@@ -15,7 +15,6 @@ use crate::behavior::{Room, Workspace};
 use crate::block::Block;
 use crate::executor::FrameRecord;
 use crate::executor::outside::Outside;
-use crate::executor::world::RECORDS_PER_CANDIDATE;
 use crate::interaction::{Contact, ContactBuffer, Scratch};
 use crate::message::Message;
 use crate::object::ObjectId;
@@ -100,7 +99,7 @@ impl Own {
         Self {
             scratch: RefCell::default(),
             workspace: RefCell::new(Workspace::with_room(room)),
-            results: RefCell::new(ContactBuffer::with_capacity(RECORDS_PER_CANDIDATE)),
+            results: RefCell::new(ContactBuffer::with_capacity(room.contacts())),
             letters: RefCell::default(),
         }
     }
