@@ -145,7 +145,8 @@ fn entrants(topology: &Arc<Topology>) -> Vec<Entrant> {
                 for frame in 0..case.frames() {
                     for block in black_box(&mut blocks) {
                         let nobody = |_| std::iter::empty();
-                        stages.update(frame, block, &mut workspace, nobody, &mut |_, _, _| {});
+                        let (nothing, post) = (std::iter::empty(), &mut |_, _, _| {});
+                        stages.update(frame, block, nothing, &mut workspace, nobody, post);
                     }
                 }
             });

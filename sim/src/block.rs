@@ -1,7 +1,7 @@
 //! Blocks of spatially close objects: the units that executors schedule.
 
 use crate::geometry::{Bounds, LANES, Lanes};
-use crate::interaction::group_set;
+use crate::interaction::{Member, group_set};
 use crate::object::{Object, ObjectId};
 use crate::simd::{Isa, Kernel, LaneSet, Simd, first_lanes, lanes};
 
@@ -73,9 +73,14 @@ impl Block {
         self.bounds = bounds;
     }
 
-    /// Whether an object is among [`Block::objects`].
-    pub(crate) fn has(&self, id: ObjectId) -> bool {
-        self.ids.binary_search(&id).is_ok()
+    /// Whether an object is among [`Block::objects`] at `place`.
+    pub(crate) fn has_at(&self, place: usize, id: ObjectId) -> bool {
+        self.ids.get(place) == Some(&id)
+    }
+
+    /// The object at `place`.
+    pub(crate) fn member(&self, place: usize) -> Member<'_> {
+        Member { object: &self.objects[place], place }
     }
 
     /// Whether it is one object, whose box the block's is: there is no need to look further.

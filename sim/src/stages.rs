@@ -4,15 +4,18 @@
 //! update adds up what it is given in the order of the other objects' numbers. So blocking, threads
 //! and order of calls never show in them.
 
+use std::mem;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
 
-use crate::behavior::{Gathered, Input, Segment, SpringWork, Workspace, batch};
+use crate::behavior::{Input, SpringWork, Workspace, batch};
 use crate::block::Block;
 use crate::geometry::Mesh;
-use crate::interaction::{Contact, ContactSink, PairScratch, Rules, Scratch, TableFull};
+use crate::interaction::{
+    ContactRecord, ContactSink, Member, PairScratch, Rules, Scratch, Segment, TableFull,
+};
 use crate::message::Message;
 use crate::object::{Drawing, Fault, FaultKind, Object, ObjectId};
 use crate::render::Renderer;
@@ -93,7 +96,7 @@ impl Stages {
         let Scratch { pairs, pair } = scratch;
         pairs.clear();
         few.overlaps(self.simd, many, pairs);
-        let objects = pairs.iter().map(|&[one, other]| [&few.objects[one], &many.objects[other]]);
+        let objects = pairs.iter().map(|&[one, other]| [few.member(one), many.member(other)]);
         self.interact_pairs(objects, pair, sink)
     }
 
@@ -110,13 +113,13 @@ impl Stages {
         let Scratch { pairs, pair } = scratch;
         pairs.clear();
         block.overlaps_within(self.simd, pairs);
-        let objects = pairs.iter().map(|places| places.map(|place| &block.objects[place]));
+        let objects = pairs.iter().map(|places| places.map(|place| block.member(place)));
         self.interact_pairs(objects, pair, sink)
     }
 
     fn interact_pairs<'o>(
         &self,
-        pairs: impl Iterator<Item = [&'o Object; 2]>,
+        pairs: impl Iterator<Item = [Member<'o>; 2]>,
         scratch: &mut PairScratch,
         sink: &mut impl ContactSink,
     ) -> Result<PairCount, TableFull> {
@@ -132,25 +135,26 @@ impl Stages {
 
     /// Updates the objects of a block.
     ///
-    /// `workspace` must have [received] this frame's interaction results for the block, and has none
-    /// afterwards. `mail` gives the messages to an object in the order in which they are to be processed:
+    /// `results` are the records of this frame's interactions of the block, of all, in any order; those of
+    /// other blocks are ignored. `mail` gives the messages to an object in the order in which they are to be processed:
     /// by sender, then by order of posting. `post` is given (from, to, message) for each message that an
     /// object sends.
     ///
     /// An object whose callback panics, whose state is not finite afterwards, or that is over budget
     /// is quarantined.
-    ///
-    /// [received]: Workspace::receive
-    pub fn update<'m, M: Iterator<Item = &'m Message>>(
+    pub fn update<'m, 'r, M: Iterator<Item = &'m Message>>(
         &self,
         frame: u64,
         block: &mut Block,
+        results: impl Iterator<Item = &'r [ContactRecord]>,
         workspace: &mut Workspace,
         mail: impl Fn(ObjectId) -> M,
         post: &mut dyn FnMut(ObjectId, ObjectId, Message),
     ) {
         let began = frame.is_multiple_of(FRAMES_PER_TIMING).then(Instant::now);
-        let Workspace { gathered: Gathered { records, segments }, springs, fetches } = workspace;
+        let Workspace { received: memory, springs, fetches } = workspace;
+        let mut received = mem::take(memory);
+        received.extend(block, results);
         if *fetches {
             block
                 .objects
@@ -158,30 +162,24 @@ impl Stages {
                 .filter_map(|object| object.geometry.as_mesh())
                 .for_each(Mesh::fetch);
         }
-        segments.sort_unstable_by_key(|segment| (segment.object, segment.other));
-        let mut rest = segments.as_slice();
         for (place, object) in block.objects.iter_mut().enumerate() {
-            let own = rest.partition_point(|segment| segment.object <= object.id());
-            let (segments, others) = rest.split_at(own);
-            rest = others;
+            let received = received.at(place);
             if object.quarantined().is_some() {
                 continue;
             }
-            let faulty = |record: &Contact| record.node == Contact::FAULT;
-            if segments.iter().any(|segment| faulty(&records[segment.start])) {
+            if received.iter().any(|segment| segment.is_fault()) {
                 object.quarantine(Fault { kind: FaultKind::Panicked, frame });
                 continue;
             }
             let own_mail = mail(object.id());
-            let given = Given { frame, place, segments, records, springs: &mut *springs };
+            let given = Given { frame, place, received, springs: &mut *springs };
             self.update_object(object, given, own_mail, post);
         }
         batch::advance(&mut block.objects, springs, self.simd);
         for waiting in springs.waiting.drain(..) {
             block.objects[waiting.place].refresh(frame, self.simd);
         }
-        records.clear();
-        segments.clear();
+        *memory = received.emptied();
         block.refresh();
         if let Some(took) = began.map(|began| began.elapsed()) {
             // Bodies that are advanced together have no time of their own.
@@ -205,8 +203,7 @@ impl Stages {
             gravity: self.gravity,
             simd: self.simd,
             object: object.id(),
-            segments: given.segments,
-            records: given.records,
+            received: given.received,
             springs: given.springs,
             post,
         };
@@ -254,7 +251,6 @@ struct Given<'a> {
     frame: u64,
     /// The object's place in the block.
     place: usize,
-    segments: &'a [Segment],
-    records: &'a [Contact],
+    received: &'a [Segment<'a>],
     springs: &'a mut SpringWork,
 }

@@ -9,7 +9,7 @@ use dualframe_sim::block::Block;
 use dualframe_sim::geometry::{Geometry, Rigid};
 use dualframe_sim::interaction::{
     Contact, ContactBuffer, ContactSink, Detection, InteractionPair, NodeSpheres, NodesInShape,
-    Penalty, Scratch, TableFull,
+    Penalty, Scratch, Segment, TableFull,
 };
 use dualframe_sim::object::{Group, Object, ObjectId};
 use dualframe_sim::stages::{PairCount, Stages};
@@ -46,16 +46,24 @@ fn tool(id: u32, shape: SharedShape, center: Vec3) -> Object {
     Object::new(ObjectId(id), SHAPES, geometry, path)
 }
 
-fn interact(stages: &Stages, a: Object, b: Object) -> (Vec<Vec<Contact>>, PairCount) {
+/// What an object is told.
+type Told = (ObjectId, Contact);
+
+/// What two objects are told, a list for each segment.
+fn interact(stages: &Stages, a: Object, b: Object) -> (Vec<Vec<Told>>, PairCount) {
     let (a, b) = (Block::new(vec![a]), Block::new(vec![b]));
     let mut buffer = ContactBuffer::default();
     let count = stages.interact(&a, &b, &mut Scratch::new(), &mut buffer).expect("grows");
-    (buffer.segments().map(<[Contact]>::to_vec).collect(), count)
+    let told = |segment: Segment<'_>| {
+        let object = segment.object();
+        segment.contacts().map(|contact| (object, contact)).collect()
+    };
+    (Segment::all(buffer.records()).map(told).collect(), count)
 }
 
 #[track_caller]
-fn assert_impulse(contact: &Contact, object: u32, node: u32, impulse: Vec3) {
-    assert_eq!((contact.object, contact.node), (ObjectId(object), node));
+fn assert_impulse((told, contact): &Told, object: u32, node: u32, impulse: Vec3) {
+    assert_eq!((*told, contact.node), (ObjectId(object), node));
     let error = (Vec3::from_array(contact.impulse) - impulse).length();
     assert!(error < 1e-4, "{contact:?}, expected {impulse}");
 }
@@ -139,7 +147,7 @@ fn damping_never_pulls_and_friction_only_stops() {
         object.geometry.as_mesh_mut().expect("a mesh").set_velocity(velocity);
         let geometry = Geometry::Rigid(Rigid::wall(Vec3::ZERO, Vec3::Y));
         let wall = Object::new(ObjectId(0), SHAPES, geometry, Fixed);
-        Vec3::from_array(interact(&stages, object, wall).0[0][0].impulse)
+        Vec3::from_array(interact(&stages, object, wall).0[0][0].1.impulse)
     };
     // 5 N by depth; 50 N s/m against the speed; half of that sideways, but no more than 1 kg needs.
     let near = |a: Vec3, b: Vec3| assert!((a - b).length() < 1e-4, "{a} {b}");
@@ -150,14 +158,14 @@ fn damping_never_pulls_and_friction_only_stops() {
     near(push(Vec3::X * 2.0), Vec3::new(-2.0, 5.0, 0.0));
 }
 
-/// A table for one record.
+/// A table for one segment of one contact.
 struct Tiny(usize);
 
 impl ContactSink for Tiny {
-    fn push(&mut self, segment: &[Contact]) -> Result<(), TableFull> {
-        let needed = self.0 + segment.len();
-        if needed > 1 {
-            return Err(TableFull { capacity: 1, needed });
+    fn push(&mut self, segment: Segment<'_>) -> Result<(), TableFull> {
+        let needed = self.0 + segment.records().len();
+        if needed > 2 {
+            return Err(TableFull { capacity: 2, needed });
         }
         self.0 = needed;
         Ok(())
@@ -169,5 +177,5 @@ fn a_full_table_is_reported() {
     let stages = stages(POINTS, POINTS, NodeSpheres::default());
     let block = Block::new(vec![point_at(0, Vec3::ZERO), point_at(1, Vec3::X * 0.1)]);
     let result = stages.interact_within(&block, &mut Scratch::new(), &mut Tiny(0));
-    assert_eq!(result, Err(TableFull { capacity: 1, needed: 2 }));
+    assert_eq!(result, Err(TableFull { capacity: 2, needed: 4 }));
 }

@@ -11,6 +11,7 @@ mod instrument;
 mod mass_spring;
 pub mod piece;
 mod pull;
+mod received;
 mod scripted;
 #[allow(unsafe_code)]
 mod spring_kernel;
@@ -26,7 +27,7 @@ use glam::Vec3;
 
 use self::drill::{Burr, Erosions};
 use crate::geometry::Geometry;
-use crate::interaction::Contact;
+use crate::interaction::{Contact, Segment};
 use crate::message::Message;
 use crate::object::ObjectId;
 use crate::simd::Simd;
@@ -42,7 +43,7 @@ pub use spring_kernel::Springs;
 pub use tissue::Tissue;
 pub use tool::{Tool, Work, Workpieces};
 pub use workspace::Workspace;
-pub(crate) use workspace::{CONTACTS_PER_OBJECT, Gathered, Room, Segment, SpringWork};
+pub(crate) use workspace::{CONTACTS_PER_OBJECT, Room, SpringWork};
 
 /// How an object changes from frame to frame.
 pub trait Behavior: Any + Send + Sync {
@@ -85,16 +86,15 @@ pub struct Input<'a> {
     pub gravity: Vec3,
     pub(crate) simd: Simd,
     pub(crate) object: ObjectId,
-    pub(crate) segments: &'a [Segment],
-    pub(crate) records: &'a [Contact],
+    pub(crate) received: &'a [Segment<'a>],
     pub(crate) springs: &'a mut SpringWork,
     pub(crate) post: &'a mut dyn FnMut(ObjectId, ObjectId, Message),
 }
 
 impl Input<'_> {
     /// What this frame's interactions did to the object, ordered by the other object's number.
-    pub fn contacts(&self) -> impl Iterator<Item = &Contact> + '_ {
-        self.segments.iter().flat_map(|segment| &self.records[segment.start..segment.end])
+    pub fn contacts(&self) -> impl Iterator<Item = Contact> + '_ {
+        self.received.iter().flat_map(|segment| segment.contacts())
     }
 
     /// Sends a message to another object, which processes it before its update of the next frame. A

@@ -1,13 +1,12 @@
 //! What updates need and leave nothing in.
 
+use super::received::Received;
 use super::{abreast, batch, spring_kernel};
 use crate::block::Block;
-use crate::interaction::Contact;
-use crate::object::ObjectId;
 
-/// Contact records of one object in one frame for which there is room from the start; usually 96, twice
+/// Contact records of one object in one frame for which there is room from the start; usually 120, twice
 /// what the densest pile has, so that a frame need not allocate.
-pub(crate) const CONTACTS_PER_OBJECT: usize = 96;
+pub(crate) const CONTACTS_PER_OBJECT: usize = 120;
 /// Other objects that one object touches at once, likewise; usually 24, twice the densest packing's.
 const TOUCHED_PER_OBJECT: usize = 24;
 
@@ -19,26 +18,11 @@ const CACHED: usize = 1 << 20;
 /// caches when the next block comes.
 #[derive(Debug, Default)]
 pub struct Workspace {
-    pub(crate) gathered: Gathered,
+    /// Empty between two updates.
+    pub(crate) received: Received<'static>,
     pub(crate) springs: SpringWork,
     /// Whether bodies are to be fetched into the caches before they are updated.
     pub(crate) fetches: bool,
-}
-
-/// Contacts of this frame for the block to be updated, collected from wherever interactions left them.
-#[derive(Debug, Default)]
-pub(crate) struct Gathered {
-    pub(crate) records: Vec<Contact>,
-    pub(crate) segments: Vec<Segment>,
-}
-
-/// Where an object's contacts with one other lie among the records gathered for a block.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Segment {
-    pub(crate) object: ObjectId,
-    pub(crate) other: ObjectId,
-    pub(crate) start: usize,
-    pub(crate) end: usize,
 }
 
 /// What springs are advanced in.
@@ -90,25 +74,11 @@ impl Workspace {
     /// Memory that usually need not grow.
     pub(crate) fn with_room(room: Room) -> Self {
         let mut workspace = Self { fetches: room.state > CACHED, ..Self::default() };
-        let Self { gathered: Gathered { records, segments }, springs, .. } = &mut workspace;
-        records.reserve(room.contacts());
-        segments.reserve(room.objects * TOUCHED_PER_OBJECT);
+        let Self { received, springs, .. } = &mut workspace;
+        received.reserve(room.objects, room.objects * TOUCHED_PER_OBJECT);
         springs.waiting.reserve(room.objects);
         springs.alone.reserve(room.nodes);
         springs.abreast.reserve(room.abreast);
         workspace
-    }
-
-    /// Takes over a segment of this frame's interaction results. Before a block is updated all must have
-    /// been taken over that concern its objects, in any order, and none of another block; a segment for
-    /// none of its objects is ignored.
-    pub fn receive(&mut self, block: &Block, segment: &[Contact]) {
-        let Some(&Contact { object, other, .. }) = segment.first() else { return };
-        if block.has(object) {
-            let Gathered { records, segments } = &mut self.gathered;
-            let start = records.len();
-            records.extend_from_slice(segment);
-            segments.push(Segment { object, other, start, end: records.len() });
-        }
     }
 }

@@ -160,11 +160,9 @@ impl Engine {
         loops.for_each(blocks, begin, |(_timer, updating), index, block| {
             let Updating { workspace, outbox } = &mut **updating;
             let outcomes = candidates.of_block(index).map(|place| &outcomes[place]);
-            outcomes
-                .flat_map(Outcome::segments)
-                .for_each(|segment| workspace.receive(block, segment));
+            let results = outcomes.map(Outcome::records);
             let mut post = |from, to, message| outbox.push((from, to, message));
-            stages.update(frame, block, workspace, letters, &mut post);
+            stages.update(frame, block, results, workspace, letters, &mut post);
             updated(index, block);
         });
         Worker::collect(&self.workers, mail);

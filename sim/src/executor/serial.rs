@@ -95,12 +95,9 @@ impl SerialExecutor {
         let letters = |object| mail.to(object).chain(from_outside.to(object));
         for (index, block) in blocks.iter_mut().enumerate() {
             let outcomes = self.candidates.of_block(index).map(|place| &self.outcomes[place]);
-            let workspace = &mut self.workspace;
-            outcomes
-                .flat_map(Outcome::segments)
-                .for_each(|segment| workspace.receive(block, segment));
+            let results = outcomes.map(Outcome::records);
             let mut post = |from, to, message| self.outbox.push((from, to, message));
-            stages.update(self.frame, block, workspace, letters, &mut post);
+            stages.update(self.frame, block, results, &mut self.workspace, letters, &mut post);
         }
         world::empty_into(&mut self.outbox, mail);
     }

@@ -239,15 +239,14 @@ impl Shared {
         let plan = read(&self.plan);
         let from_outside = self.outside.due(frame);
         let letters = |object| plan.mail.to(object).chain(from_outside.to(object));
+        let outcomes: Vec<_> =
+            plan.outcomes[..plan.candidates.pairs.len()].iter().map(read).collect();
         for index in self.share(worker, self.blocks.len()) {
+            let results = plan.candidates.of_block(index).map(|place| outcomes[place].records());
             let mut outbox = lock(&self.outboxes[index]);
             let mut post = |from, to, message| outbox.push((from, to, message));
             let mut block = write(&self.blocks[index]);
-            for place in plan.candidates.of_block(index) {
-                let outcome = read(&plan.outcomes[place]);
-                outcome.segments().for_each(|segment| workspace.receive(&block, segment));
-            }
-            plan.stages.update(frame, &mut block, workspace, letters, &mut post);
+            plan.stages.update(frame, &mut block, results, workspace, letters, &mut post);
         }
     }
 

@@ -10,7 +10,7 @@ use super::outside::Outside;
 use crate::block::Block;
 use crate::blocking::{Blocking, FRAMES_PER_BLOCKING, Grain};
 use crate::geometry::Bounds;
-use crate::interaction::{Contact, ContactBuffer, Scratch};
+use crate::interaction::{ContactBuffer, ContactRecord, Scratch};
 use crate::message::{Letter, Message};
 use crate::object::{Object, ObjectId};
 use crate::scene::Scene;
@@ -231,8 +231,8 @@ impl Outcome {
         self.pairs = counted.unwrap_or_default();
     }
 
-    pub(super) fn segments(&self) -> impl Iterator<Item = &[Contact]> + '_ {
-        self.contacts.segments()
+    pub(super) fn records(&self) -> &[ContactRecord] {
+        self.contacts.records()
     }
 }
 

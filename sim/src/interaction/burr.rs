@@ -84,6 +84,7 @@ mod tests {
     use crate::behavior::drill::{Bit, Burr};
     use crate::behavior::{Behavior, Bone, Fixed, Input};
     use crate::geometry::{Geometry, Rigid, Volume};
+    use crate::interaction::{Member, Segment};
     use crate::object::{Group, ObjectId};
 
     const TIME: f32 = 1.0 / 60.0;
@@ -126,7 +127,9 @@ mod tests {
     }
 
     fn reaction(impulses: &mut Impulses) -> Reaction {
-        Reaction::new(impulses.segment(ObjectId(0), ObjectId(1)).iter(), TIME)
+        let someone = bone();
+        let segment = impulses.segment([Member { object: &someone, place: 0 }; 2]);
+        Reaction::new(segment.into_iter().flat_map(Segment::contacts), TIME)
     }
 
     #[test]

@@ -2,16 +2,15 @@
 
 use thiserror::Error;
 
+use super::Member;
 use crate::object::ObjectId;
 
 /// What one object did to one node of another in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// The object it was done to.
-    pub object: ObjectId,
     /// The object that did it.
     pub other: ObjectId,
-    /// The node of `object`, or [`Contact::BODY`], or [`Contact::FAULT`].
+    /// The node, or [`Contact::BODY`], or [`Contact::FAULT`].
     pub node: u32,
     /// The impulse over the whole frame, in newton seconds.
     pub impulse: [f32; 3],
@@ -26,6 +25,98 @@ impl Contact {
     pub const FAULT: u32 = u32::MAX;
 }
 
+/// Contacts as they lie in memory, four to a cache line: what those of a pair have in common is in a
+/// record of its own before them.
+///
+/// ```text
+/// how many follow | object | its place | other      the head of a segment
+/// node            | impulse (x, y, z)               a contact
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ContactRecord([u32; 4]);
+
+impl ContactRecord {
+    pub(super) fn head(contacts: usize, [to, from]: [Member<'_>; 2]) -> Self {
+        Self([contacts as u32, to.object.id().0, to.place as u32, from.object.id().0])
+    }
+
+    pub(super) fn contact(node: u32, impulse: [f32; 3]) -> Self {
+        let [x, y, z] = impulse.map(f32::to_bits);
+        Self([node, x, y, z])
+    }
+
+    pub(super) fn node(self) -> u32 {
+        self.0[0]
+    }
+
+    /// Adds to a contact's impulse.
+    pub(super) fn add(&mut self, impulse: [f32; 3]) {
+        for (sum, part) in self.0[1..].iter_mut().zip(impulse) {
+            *sum = (f32::from_bits(*sum) + part).to_bits();
+        }
+    }
+}
+
+/// What one object did to another in one frame: records of at least one contact behind their head.
+#[derive(Clone, Copy, Debug)]
+pub struct Segment<'r>(&'r [ContactRecord]);
+
+impl<'r> Segment<'r> {
+    /// The segment that these records are.
+    pub(super) fn new(records: &'r [ContactRecord]) -> Self {
+        Self(records)
+    }
+
+    /// The segments that were stored one after the other.
+    pub fn all(mut records: &'r [ContactRecord]) -> impl Iterator<Item = Self> {
+        std::iter::from_fn(move || {
+            let contacts = records.first()?.0[0] as usize;
+            let (segment, rest) = records.split_at_checked(1 + contacts)?;
+            records = rest;
+            Some(Self(segment))
+        })
+    }
+
+    /// The records, to be stored.
+    #[must_use]
+    pub fn records(self) -> &'r [ContactRecord] {
+        self.0
+    }
+
+    /// The object it was done to.
+    #[must_use]
+    pub fn object(self) -> ObjectId {
+        self.0.first().map_or(ObjectId::HOST, |head| ObjectId(head.0[1]))
+    }
+
+    /// That object's place in its block.
+    pub(crate) fn place(self) -> usize {
+        self.0.first().map_or(0, |head| head.0[2] as usize)
+    }
+
+    /// The object that did it.
+    #[must_use]
+    pub fn other(self) -> ObjectId {
+        self.0.first().map_or(ObjectId::HOST, |head| ObjectId(head.0[3]))
+    }
+
+    /// Its contacts, one at most for each node.
+    pub fn contacts(self) -> impl Iterator<Item = Contact> + use<'r> {
+        let other = self.other();
+        let contacts = self.0.iter().skip(1);
+        contacts.map(move |&ContactRecord([node, x, y, z])| Contact {
+            other,
+            node,
+            impulse: [x, y, z].map(f32::from_bits),
+        })
+    }
+
+    /// Whether the interaction panicked.
+    pub(crate) fn is_fault(self) -> bool {
+        self.contacts().next().is_some_and(|contact| contact.node == Contact::FAULT)
+    }
+}
+
 /// A table of contacts has no room for a segment. Nothing of the segment was stored.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 #[error("the contact table holds {capacity} records, {needed} are needed")]
@@ -38,51 +129,39 @@ pub struct TableFull {
 
 /// Where interactions put their results.
 pub trait ContactSink {
-    /// Stores a segment: at least one record, all with the same `object` and `other`. There is at
-    /// most one segment for an ordered pair of objects in a frame.
+    /// Stores a segment. There is at most one for an ordered pair of objects in a frame.
     ///
     /// # Errors
     /// The table is full.
-    fn push(&mut self, segment: &[Contact]) -> Result<(), TableFull>;
+    fn push(&mut self, segment: Segment<'_>) -> Result<(), TableFull>;
 }
 
 /// Contacts in memory that grows as needed and is used again.
 #[derive(Clone, Debug, Default)]
-pub struct ContactBuffer {
-    records: Vec<Contact>,
-    ends: Vec<usize>,
-}
+pub struct ContactBuffer(Vec<ContactRecord>);
 
 impl ContactBuffer {
     /// A buffer that need not grow up to so many records.
     #[must_use]
     pub fn with_capacity(records: usize) -> Self {
-        // Few segments have fewer than four records.
-        Self { records: Vec::with_capacity(records), ends: Vec::with_capacity(records / 4) }
+        Self(Vec::with_capacity(records))
     }
 
     /// Forgets the contents, keeps the memory.
     pub fn clear(&mut self) {
-        self.records.clear();
-        self.ends.clear();
+        self.0.clear();
     }
 
-    /// All records, and where among them each segment ends.
-    pub(crate) fn parts(&self) -> (&[Contact], &[usize]) {
-        (&self.records, &self.ends)
-    }
-
-    /// The segments in the order in which they were stored.
-    pub fn segments(&self) -> impl Iterator<Item = &[Contact]> + '_ {
-        let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        starts.zip(&self.ends).map(|(start, &end)| &self.records[start..end])
+    /// The records of all segments in the order in which they were stored.
+    #[must_use]
+    pub fn records(&self) -> &[ContactRecord] {
+        &self.0
     }
 }
 
 impl ContactSink for ContactBuffer {
-    fn push(&mut self, segment: &[Contact]) -> Result<(), TableFull> {
-        self.records.extend_from_slice(segment);
-        self.ends.push(self.records.len());
+    fn push(&mut self, segment: Segment<'_>) -> Result<(), TableFull> {
+        self.0.extend_from_slice(segment.records());
         Ok(())
     }
 }

@@ -1,64 +1,74 @@
 //! What a response found for one object of a pair, summed up node by node.
 
-use super::contact::Contact;
-use crate::object::ObjectId;
+use super::Member;
+use super::contact::{ContactRecord, Segment};
 
 /// The impulses on one object of a pair: one sum per touched node.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Impulses {
-    records: Vec<Contact>,
-    /// For each node one more than its place among the records, or 0.
+    /// The head of a segment, which is filled in when the pair is done, and the sums.
+    records: Vec<ContactRecord>,
+    /// For each node its sum's place among the records, or 0.
     places: Vec<u32>,
+}
+
+impl Default for Impulses {
+    fn default() -> Self {
+        Self { records: vec![ContactRecord::default()], places: Vec::new() }
+    }
 }
 
 impl Impulses {
     /// Adds an impulse, in newton seconds, to a node's sum, or for [`Contact::BODY`] to the whole
     /// body's.
+    ///
+    /// [`Contact::BODY`]: super::Contact::BODY
+    #[inline]
     pub fn add(&mut self, node: u32, impulse: [f32; 3]) {
         if let Some(sum) = self.find(node) {
-            for (sum, part) in sum.iter_mut().zip(impulse) {
-                *sum += part;
-            }
+            sum.add(impulse);
             return;
         }
-        // The ids are filled in when the pair is done; every record of a side has the same.
-        let nobody = ObjectId::HOST;
-        self.records.push(Contact { object: nobody, other: nobody, node, impulse });
+        let new = self.records.len() as u32;
+        self.records.push(ContactRecord::contact(node, impulse));
         if let Some(place) = self.places.get_mut(node as usize) {
-            *place = self.records.len() as u32;
+            *place = new;
         }
     }
 
     /// The sum of a node that has one already.
-    fn find(&mut self, node: u32) -> Option<&mut [f32; 3]> {
-        let index = match self.places.get(node as usize) {
+    fn find(&mut self, node: u32) -> Option<&mut ContactRecord> {
+        let place = match self.places.get(node as usize) {
             Some(0) => return None,
-            Some(&place) => place as usize - 1,
-            None => self.records.iter().position(|record| record.node == node)?,
+            Some(&place) => place as usize,
+            None => 1 + self.sums().iter().position(|sum| sum.node() == node)?,
         };
-        self.records.get_mut(index).map(|record| &mut record.impulse)
+        self.records.get_mut(place)
+    }
+
+    fn sums(&self) -> &[ContactRecord] {
+        self.records.get(1..).unwrap_or_default()
     }
 
     /// Forgets everything and makes ready for an object with so many nodes.
     pub(super) fn reset(&mut self, nodes: usize) {
-        for record in &self.records {
-            if let Some(place) = self.places.get_mut(record.node as usize) {
+        for record in self.records.iter().skip(1) {
+            if let Some(place) = self.places.get_mut(record.node() as usize) {
                 *place = 0;
             }
         }
-        self.records.clear();
+        self.records.truncate(1);
         if self.places.len() < nodes {
             self.places.resize(nodes, 0);
             self.records.reserve(nodes + 1);
         }
     }
 
-    /// The sums as one segment.
-    pub(super) fn segment(&mut self, object: ObjectId, other: ObjectId) -> &[Contact] {
-        for record in &mut self.records {
-            record.object = object;
-            record.other = other;
-        }
-        &self.records
+    /// The sums as one segment, if there are any, for the first from the second.
+    pub(super) fn segment(&mut self, ends: [Member<'_>; 2]) -> Option<Segment<'_>> {
+        let sums = self.sums().len();
+        let head = self.records.first_mut().filter(|_| sums > 0)?;
+        *head = ContactRecord::head(sums, ends);
+        Some(Segment::new(&self.records))
     }
 }

@@ -26,7 +26,7 @@ pub use attachment::{Attached, Link};
 pub use bone_nodes::NodesInBone;
 pub use burr::{BurrForce, BurrInBone};
 pub use compliant::{Compliant, CompliantError};
-pub use contact::{Contact, ContactBuffer, ContactSink, TableFull};
+pub use contact::{Contact, ContactBuffer, ContactRecord, ContactSink, Segment, TableFull};
 pub use impulses::Impulses;
 pub use nodes::NodeSpheres;
 pub use penalty::{Penalty, PenaltyError};
@@ -85,6 +85,13 @@ impl Scratch {
     }
 }
 
+/// An object of a block, and its place there.
+#[derive(Clone, Copy)]
+pub(crate) struct Member<'o> {
+    pub(crate) object: &'o Object,
+    pub(crate) place: usize,
+}
+
 /// What the interaction of one pair works in.
 #[derive(Debug)]
 pub(crate) struct PairScratch {
@@ -106,18 +113,18 @@ impl PairScratch {
     pub(crate) fn interact(
         &mut self,
         pair: &InteractionPair,
-        bodies: [&Object; 2],
+        [first, second]: [Member<'_>; 2],
         stages: &Stages,
         sink: &mut impl ContactSink,
     ) -> Result<bool, TableFull> {
         self.touches.clear();
         self.touches.simd = stages.simd;
+        let bodies = [first.object, second.object];
         for (impulses, body) in self.impulses.iter_mut().zip(bodies) {
             impulses.reset(body.geometry.as_mesh().map_or(0, |mesh| mesh.positions.len()));
         }
-        let [first, second] = bodies;
         let done = catch_unwind(AssertUnwindSafe(|| {
-            pair.detection.detect(first, second, &mut self.touches);
+            pair.detection.detect(bodies[0], bodies[1], &mut self.touches);
             if !self.touches.list().is_empty() {
                 let [on_first, on_second] = &mut self.impulses;
                 pair.response.respond(
@@ -129,17 +136,18 @@ impl PairScratch {
             }
         }));
         if done.is_err() {
-            for (object, other) in [(first, second), (second, first)] {
-                let (object, other) = (object.id(), other.id());
-                sink.push(&[Contact { object, other, node: Contact::FAULT, impulse: [0.0; 3] }])?;
+            for ends in [[first, second], [second, first]] {
+                let head = ContactRecord::head(1, ends);
+                let fault = ContactRecord::contact(Contact::FAULT, [0.0; 3]);
+                sink.push(Segment::new(&[head, fault]))?;
             }
             return Ok(false);
         }
-        let sides = self.impulses.iter_mut().zip([(first, second), (second, first)]);
-        for (impulses, (object, other)) in sides {
-            let segment = impulses.segment(object.id(), other.id());
+        for (impulses, ends) in self.impulses.iter_mut().zip([[first, second], [second, first]]) {
             // Nobody would read what scenery is told.
-            if !object.is_fixed() && !segment.is_empty() {
+            if !ends[0].object.is_fixed()
+                && let Some(segment) = impulses.segment(ends)
+            {
                 sink.push(segment)?;
             }
         }

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::{Detection, Response};
+use super::{Detection, Member, Response};
 use crate::object::{Group, Object};
 
 /// The interaction pair (§4.1, Fig. 3): algorithms for detection and response.
@@ -97,14 +97,15 @@ impl Rules {
     /// The rule for two objects, and the objects in the rule's order.
     pub(crate) fn find<'o>(
         &self,
-        a: &'o Object,
-        b: &'o Object,
-    ) -> Option<(&InteractionPair, [&'o Object; 2])> {
-        let (low, high) = if a.id() < b.id() { (a, b) } else { (b, a) };
+        a: Member<'o>,
+        b: Member<'o>,
+    ) -> Option<(&InteractionPair, [Member<'o>; 2])> {
+        let (low, high) = if a.object.id() < b.object.id() { (a, b) } else { (b, a) };
+        let groups = [low, high].map(|end| end.object.group());
         self.pairs.iter().find_map(|(first, second, pair)| {
-            if (low.group(), high.group()) == (*first, *second) {
+            if groups == [*first, *second] {
                 Some((pair, [low, high]))
-            } else if (high.group(), low.group()) == (*first, *second) {
+            } else if groups == [*second, *first] {
                 Some((pair, [high, low]))
             } else {
                 None

@@ -17,7 +17,7 @@ use dualframe_sim::executor::{
     OpenMpDynamicExecutor, OpenMpStaticExecutor, TbbForExecutor, TbbPipelineExecutor,
 };
 use dualframe_sim::geometry::{Geometry, Mesh, Topology};
-use dualframe_sim::interaction::{ContactBuffer, Rules, Scratch};
+use dualframe_sim::interaction::{ContactBuffer, Rules, Scratch, Segment};
 use dualframe_sim::object::{Group, Object, ObjectId};
 use dualframe_sim::pool::Pool;
 use dualframe_sim::render::NullRenderer;
@@ -123,11 +123,12 @@ impl Reference {
             count += self.stages.interact_within(a, &mut scratch, &mut buffer).expect("grows");
         }
         let mut workspace = Workspace::default();
-        let segments: Vec<_> = buffer.segments().collect();
+        let segments: Vec<_> = Segment::all(buffer.records()).map(Segment::records).collect();
         for block in &mut self.blocks {
-            segments.iter().rev().for_each(|segment| workspace.receive(block, segment));
+            let results = segments.iter().rev().copied();
             let nobody = |_| std::iter::empty();
-            self.stages.update(self.frame, block, &mut workspace, nobody, &mut |_, _, _| {});
+            let post = &mut |_, _, _| {};
+            self.stages.update(self.frame, block, results, &mut workspace, nobody, post);
         }
         self.frame += 1;
         count

@@ -24,7 +24,7 @@ impl Reaction {
 
     /// What a frame's contacts say of a rigid tool; `time_step` is the frame's, in seconds.
     #[must_use]
-    pub fn new<'c>(contacts: impl Iterator<Item = &'c Contact>, time_step: f32) -> Self {
+    pub fn new(contacts: impl Iterator<Item = Contact>, time_step: f32) -> Self {
         let mut reaction = Self::default();
         for contact in contacts {
             let force = Vec3::from_array(contact.impulse) / time_step;

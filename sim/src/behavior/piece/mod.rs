@@ -114,7 +114,7 @@ impl Piece {
     }
 
     /// What a frame's contacts did to it.
-    fn receive(&mut self, contact: &Contact, volume: &Volume) {
+    fn receive(&mut self, contact: Contact, volume: &Volume) {
         let at = match self.samples.get(contact.node as usize) {
             Some(&sample) => volume.turned(sample - self.body.middle),
             None if contact.node == Contact::BODY => Vec3::ZERO,

@@ -114,10 +114,9 @@ impl TbbPipelineExecutor {
         let work = |worker: usize, index: usize, block: &mut Block| {
             let (_timer, mut updating) = workers[worker].begin_update(*frame);
             let Updating { workspace, outbox } = &mut *updating;
-            let segments = candidates.of_block(index).map(outcome).flat_map(Outcome::segments);
-            segments.for_each(|segment| workspace.receive(block, segment));
+            let results = candidates.of_block(index).map(outcome).map(Outcome::records);
             let mut post = |from, to, message| outbox.push((from, to, message));
-            stages.update(*frame, block, workspace, letters, &mut post);
+            stages.update(*frame, block, results, workspace, letters, &mut post);
         };
         let mut waiting: Vec<&Block> = Vec::with_capacity(blocks.len());
         let mut screen = SendWrapper::new(renderer);

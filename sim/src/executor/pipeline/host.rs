@@ -15,7 +15,7 @@ use crate::behavior::{Room, Workspace};
 use crate::block::Block;
 use crate::executor::FrameRecord;
 use crate::executor::outside::Outside;
-use crate::interaction::{Contact, ContactBuffer, Scratch};
+use crate::interaction::{ContactBuffer, ContactRecord, Scratch};
 use crate::message::Message;
 use crate::object::ObjectId;
 use crate::render::Renderer;
@@ -133,7 +133,7 @@ pub(super) struct Screen<'s> {
 impl<'s> Environment for Host<'s> {
     type Object = Unit;
     type Interaction = PairCount;
-    type Contact = Contact;
+    type Contact = ContactRecord;
     type Message = Parcel;
     type Renderer = Screen<'s>;
     type Error = TableFull;
@@ -152,7 +152,7 @@ impl<'s> Environment for Host<'s> {
         a: &Unit,
         b: &Unit,
         count: &mut PairCount,
-        contacts: &mut Contacts<'_, '_, Contact>,
+        contacts: &mut Contacts<'_, '_, ContactRecord>,
     ) -> Result<(), TableFull> {
         let (stages, scratch) = (self.shared.stages, &mut *self.own.scratch.borrow_mut());
         let results = &mut *self.own.results.borrow_mut();
@@ -164,8 +164,7 @@ impl<'s> Environment for Host<'s> {
         };
         // A buffer in growing memory is never full.
         *count = counted.unwrap_or_default();
-        let (records, ends) = results.parts();
-        contacts.push_segments(records, ends)
+        contacts.push(results.records())
     }
 
     fn update(
@@ -191,12 +190,12 @@ impl<'s> Environment for Host<'s> {
         let Unit { block, pairs } = unit;
         *pairs = PairCount::default();
         // The block brings them into its objects' order itself.
-        for interaction in inputs.interactions_in_any_order() {
+        let results = inputs.interactions_in_any_order().flat_map(|interaction| {
             if interaction.other >= id {
                 *pairs += *interaction.state;
             }
-            interaction.contacts.for_each(|segment| workspace.receive(block, segment));
-        }
+            interaction.contacts
+        });
         let mut outcome = Ok(());
         let mut post = |from: ObjectId, to: ObjectId, message| {
             // A letter to nobody is lost, as `Input::post` says.
@@ -205,7 +204,7 @@ impl<'s> Environment for Host<'s> {
                 outcome = Err(rejected.full);
             }
         };
-        shared.stages.update(number, block, workspace, mail, &mut post);
+        shared.stages.update(number, block, results, workspace, mail, &mut post);
         outcome
     }
 

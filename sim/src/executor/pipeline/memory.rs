@@ -10,7 +10,7 @@ use dualframe_core::unit::UnitId;
 use super::host::{Parcel, Unit};
 use crate::behavior::CONTACTS_PER_OBJECT;
 use crate::block::Block;
-use crate::interaction::Contact;
+use crate::interaction::ContactRecord;
 use crate::object::Object;
 use crate::stages::{PairCount, Stages};
 
@@ -31,7 +31,7 @@ const CANDIDATES_PER_BLOCK: usize = 128;
 pub(super) struct Tables {
     units: Vec<UnitSlot<Unit>>,
     interactions: Vec<InteractionSlot<PairCount>>,
-    contacts: Vec<ContactSlot<Contact>>,
+    contacts: Vec<ContactSlot<ContactRecord>>,
     segments: Vec<SegmentSlot>,
     letters: Vec<LetterSlot<Parcel>>,
     queues: Vec<QueueSlot>,
@@ -81,7 +81,12 @@ impl Tables {
 
     pub(super) fn lend<E>(&mut self) -> Memory<'_, E>
     where
-        E: Environment<Object = Unit, Interaction = PairCount, Contact = Contact, Message = Parcel>,
+        E: Environment<
+                Object = Unit,
+                Interaction = PairCount,
+                Contact = ContactRecord,
+                Message = Parcel,
+            >,
     {
         Memory {
             units: &mut self.units,
