@@ -212,6 +212,13 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         }
     }
 
+    /// An update that is queued at the home of this number.
+    #[inline]
+    pub(crate) fn pop_update(&self, home: u32) -> Option<Work> {
+        let home = self.tables.queues.homes.at(home);
+        if home.update.looks_empty() { None } else { self.pop(home, Stage::Update) }
+    }
+
     /// A unit of the frame on display. Another holder may have swapped since `display` was read,
     /// and the queue may then hold units of a frame that may not be rendered yet: those go back.
     pub(crate) fn pop_render(&self) -> Option<Work> {

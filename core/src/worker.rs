@@ -1,6 +1,6 @@
 //! Workers: one step, one work unit (§5.3).
 
-use heapless::Vec;
+use heapless::{Deque, Vec};
 
 use crate::environment::Environment;
 use crate::error::TableFull;
@@ -10,7 +10,7 @@ use crate::probe::{NoProbe, Probe};
 use crate::stage::{Stage, Stages};
 use crate::sync::{fence, seeded, site};
 use crate::token::Token;
-use crate::unit::{UnitId, Work};
+use crate::unit::{InteractionId, UnitId, Work};
 use crate::wait::{Spin, Waiting};
 
 /// What a step did.
@@ -34,18 +34,26 @@ pub(crate) trait Outputs {
     fn all_done(&mut self);
 }
 
-/// Work units that a worker may carry at once: more than one block has neighbours, so that a unit's
-/// interactions need no queue. Usually 32; beyond it they are queued.
+/// Interactions, and other work units, that a worker may carry at once: more than one block has neighbours,
+/// so that a unit's interactions need no queue. Usually 32; beyond it they are queued.
 #[cfg(not(loom))]
 const MOST_CARRIED: usize = 32;
 /// Nobody else sees what is carried: what is queued is what models are about.
 #[cfg(loom)]
 const MOST_CARRIED: usize = 1;
 
-/// Carry-over (§4.2): outputs are carried, newest first, as long as nobody is hungry; and how many
-/// sleepers what was queued is to wake.
+/// Interactions of the frame being gathered that a worker keeps while it can update: what it does when
+/// nothing is left but updates that others are at, for which the frame's opening waits. Usually 16, about
+/// an update's time.
+const RESERVE: usize = MOST_CARRIED / 2;
+
+/// Carry-over (§4.2): outputs are carried as long as nobody is hungry; and how many sleepers what was
+/// queued is to wake.
 struct Carry<'p, 'm, E: Environment, W: Waiting> {
     pipeline: &'p Pipeline<'m, E, W>,
+    /// Interactions, oldest first.
+    interactions: Deque<InteractionId, MOST_CARRIED>,
+    /// All else, newest first.
     works: Vec<Work, MOST_CARRIED>,
     queued: u32,
     renders: u32,
@@ -55,8 +63,16 @@ struct Carry<'p, 'm, E: Environment, W: Waiting> {
 }
 
 impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
+    #[inline]
+    fn is_empty(&self) -> bool {
+        self.works.is_empty() && self.interactions.is_empty()
+    }
+
     /// Gives what is carried to whoever comes first.
     fn shed(&mut self) {
+        while let Some(id) = self.interactions.pop_front() {
+            self.queue(Work::Interact(id));
+        }
         while let Some(work) = self.works.pop() {
             self.queue(work);
         }
@@ -65,10 +81,45 @@ impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
     /// Gives what is carried to those who found nothing to do, if there are any.
     #[inline]
     fn share(&mut self) {
-        if !self.works.is_empty() && self.pipeline.bells.somebody_is_hungry() {
+        if !self.is_empty() && self.pipeline.bells.somebody_is_hungry() {
             self.shed();
             self.announce();
         }
+    }
+
+    /// Carries `work`, if there is room for it.
+    #[inline]
+    fn carry(&mut self, work: Work) -> bool {
+        if let Work::Interact(id) = work {
+            return self.interactions.push_back(id).is_ok();
+        }
+        let fits = self.works.push(work).is_ok();
+        // A rendering stays on top: only holders can do it.
+        if let [.., below @ Work::Render(_), top] = self.works.as_mut_slice()
+            && fits
+        {
+            ::core::mem::swap(below, top);
+        }
+        fits
+    }
+
+    /// The next that is carried, or an update at home: first what others wait for.
+    fn take(&mut self) -> Option<Work> {
+        let Some(&id) = self.interactions.front() else { return self.works.pop() };
+        let oldest = Work::Interact(id);
+        // Updates wait for the open frame's; for the next frame's nobody does before it is open.
+        let is_awaited = self.pipeline.frame_of(oldest) == self.pipeline.window.open();
+        match self.works.last() {
+            Some(Work::Update(_)) if is_awaited => {}
+            Some(_) => return self.works.pop(),
+            None if is_awaited || self.interactions.len() > RESERVE => {}
+            None => {
+                if let Some(update) = self.pipeline.pop_update(self.home) {
+                    return Some(update);
+                }
+            }
+        }
+        self.interactions.pop_front().map(Work::Interact)
     }
 
     /// Whether `unit` is another home's, whose worker is to have it if it comes for it in time.
@@ -92,6 +143,7 @@ impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
         self.set_hungry(false);
         if seeded!(LeavesWithCarry) {
             self.works.clear();
+            self.interactions.clear();
         }
         self.shed();
         if seeded!(CallNotPassedOn) {
@@ -124,15 +176,8 @@ impl<E: Environment, W: Waiting> Outputs for Carry<'_, '_, E, W> {
             return;
         }
         // One work unit is for this worker itself.
-        let shared = !self.works.is_empty() && self.pipeline.bells.somebody_is_hungry();
-        if shared || self.works.is_full() {
+        if (!self.is_empty() && self.pipeline.bells.somebody_is_hungry()) || !self.carry(work) {
             self.queue(work);
-        } else {
-            let _fits = self.works.push(work);
-            // A rendering stays on top: only holders can do it.
-            if let [.., below @ Work::Render(_), top] = self.works.as_mut_slice() {
-                ::core::mem::swap(below, top);
-            }
         }
     }
 
@@ -166,8 +211,15 @@ pub struct Worker<'p, 'm, E: Environment, W: Waiting = Spin, P: Probe = NoProbe>
 
 impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
     pub(crate) fn new(pipeline: &'p Pipeline<'m, E, W>, home: u32, probe: P) -> Self {
-        let carry =
-            Carry { pipeline, works: Vec::new(), queued: 0, renders: 0, hungry: false, home };
+        let carry = Carry {
+            pipeline,
+            works: Vec::new(),
+            interactions: Deque::new(),
+            queued: 0,
+            renders: 0,
+            hungry: false,
+            home,
+        };
         Self { carry, stage: Stage::BroadPhase, token: None, probe }
     }
 
@@ -254,7 +306,7 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         {
             return Some(work);
         }
-        if let Some(work) = self.carry.works.pop() {
+        if let Some(work) = self.carry.take() {
             return Some(work);
         }
         // Visible work may be gone when it is popped: look again, but no stage more than once,
@@ -275,7 +327,7 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
     /// Whether a step would find work now, or the pipeline is at rest.
     pub fn has_cause_to_wake(&self) -> bool {
         let pipeline = self.carry.pipeline;
-        !self.carry.works.is_empty()
+        !self.carry.is_empty()
             || !pipeline.visible_anywhere(self.token.is_some()).is_empty()
             || pipeline.finished()
     }

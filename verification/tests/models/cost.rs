@@ -63,8 +63,8 @@ pub(crate) fn note(add: impl FnOnce(&mut Did)) {
     });
 }
 
-/// Work units that a worker carries at most, under loom.
-const CARRIED: u32 = 1;
+/// Work units that a worker carries at most, under loom: an interaction, and one that is none.
+const CARRIED: u32 = 2;
 /// Letters under way at most, in any model.
 const LETTERS: u32 = 2;
 
