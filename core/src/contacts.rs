@@ -201,35 +201,16 @@ impl<'a, 'm, C: Copy> Contacts<'a, 'm, C> {
         self.first
     }
 
-    /// Appends `records` as one segment, which the updates read as one slice.
+    /// Appends `records` as one segment, which the updates read as one slice. What belongs together is best
+    /// pushed together: claiming room takes as long for one record as for many.
     ///
     /// # Errors
     /// [`TableFull`] if the frame's pool has no room; nothing is written then.
     #[inline]
     pub fn push(&mut self, records: &[C]) -> Result<(), TableFull> {
-        self.push_segments(records, &[records.len()])
-    }
-
-    /// Appends `records` as several segments, at the price of one: `ends` says where in `records`
-    /// each segment ends, in ascending order. What is past the last end is left out, and an end
-    /// that is too small or too large is taken for the nearest.
-    ///
-    /// # Errors
-    /// [`TableFull`] if the frame's pool has no room for all of them; nothing is written then.
-    pub fn push_segments(&mut self, records: &[C], ends: &[usize]) -> Result<(), TableFull> {
-        let records = ends.last().map_or(&[][..], |&end| records.get(..end).unwrap_or(records));
-        let total = records.len();
-        if total == 0 {
-            return Ok(());
-        }
-        let base = self.pools.write(self.frame, records)?;
-        let mut start = 0;
-        for &end in ends {
-            let end = end.min(total).max(start);
-            if end > start {
-                self.append(base + start as u32, (end - start) as u32);
-            }
-            start = end;
+        if !records.is_empty() {
+            let segment = self.pools.write(self.frame, records)?;
+            self.append(segment, records.len() as u32);
         }
         Ok(())
     }
@@ -288,39 +269,32 @@ impl<'a, C> Iterator for Segments<'a, '_, C> {
 mod tests {
     use super::*;
 
-    /// What is read of `records` pushed with `ends`, segment by segment.
-    fn read_back(records: &[u8], ends: &[usize]) -> std::vec::Vec<std::vec::Vec<u8>> {
+    #[test]
+    fn slices_are_read_as_they_were_pushed() {
         let contacts: [ContactSlot<u8>; 16] = [const { ContactSlot::new() }; 16];
         let segments = [const { SegmentSlot::new() }; 16];
         let pools = Pools::new(&contacts, &segments);
         let mut pushed = Contacts::new(&pools, Frame(1));
-        assert_eq!(pushed.push(&[9]), Ok(()));
-        assert_eq!(pushed.push_segments(records, ends), Ok(()));
+        let slices: [&[u8]; 4] = [&[9], &[1, 2], &[], &[3]];
+        for slice in slices {
+            assert_eq!(pushed.push(slice), Ok(()));
+        }
         // SAFETY: nothing is pushed and nothing is reset while the segments are read.
-        unsafe { pools.segments(pushed.first()) }.map(<[u8]>::to_vec).collect()
+        let read = unsafe { pools.segments(pushed.first()) };
+        assert!(read.eq([&[9][..], &[1, 2], &[3]]), "nothing is nothing");
     }
 
     #[test]
-    fn segments_end_where_they_are_said_to() {
-        assert_eq!(read_back(&[1, 2, 3], &[1, 3]), [&[9][..], &[1], &[2, 3]]);
-        assert_eq!(read_back(&[1, 2, 3], &[2]), [&[9][..], &[1, 2]], "the rest is left out");
-        assert_eq!(read_back(&[1, 2, 3], &[0, 1, 1, 3]), [&[9][..], &[1], &[2, 3]]);
-        assert_eq!(read_back(&[1, 2, 3], &[2, 1, 3]), [&[9][..], &[1, 2], &[3]]);
-        assert_eq!(read_back(&[1, 2, 3], &[1, 99]), [&[9][..], &[1], &[2, 3]]);
-        assert_eq!(read_back(&[1], &[]), [&[9][..]]);
-        assert_eq!(read_back(&[], &[7]), [&[9][..]]);
-    }
-
-    #[test]
-    fn all_segments_fit_or_none() {
+    fn all_records_fit_or_none() {
         let contacts: [ContactSlot<u8>; 8] = [const { ContactSlot::new() }; 8];
         let segments = [const { SegmentSlot::new() }; 8];
         let pools = Pools::new(&contacts, &segments);
         let mut pushed = Contacts::new(&pools, Frame(0));
         let full = TableFull { table: Table::Contacts, capacity: 4, needed: 5 };
-        assert_eq!(pushed.push_segments(&[1, 2, 3, 4, 5], &[2, 5]), Err(full));
+        assert_eq!(pushed.push(&[1, 2, 3, 4, 5]), Err(full));
         assert_eq!((pushed.first(), pools.used(Frame(0))), (NONE, 0));
     }
+
     #[test]
     fn two_frames_share_no_room() {
         let contacts: [ContactSlot<u8>; 8] = [const { ContactSlot::new() }; 8];
