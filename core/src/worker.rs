@@ -109,17 +109,13 @@ impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
         let oldest = Work::Interact(id);
         // Updates wait for the open frame's; for the next frame's nobody does before it is open.
         let is_awaited = self.pipeline.frame_of(oldest) == self.pipeline.window.open();
-        match self.works.last() {
-            Some(Work::Update(_)) if is_awaited => {}
-            Some(_) => return self.works.pop(),
-            None if is_awaited || self.interactions.len() > RESERVE => {}
-            None => {
-                if let Some(update) = self.pipeline.pop_update(self.home) {
-                    return Some(update);
-                }
-            }
-        }
-        self.interactions.pop_front().map(Work::Interact)
+        let before_updates = is_awaited || self.interactions.len() > RESERVE;
+        let other = match self.works.last() {
+            Some(Work::Update(_)) | None if before_updates => None,
+            Some(_) => self.works.pop(),
+            None => self.pipeline.pop_update(self.home),
+        };
+        other.or_else(|| self.interactions.pop_front().map(Work::Interact))
     }
 
     /// Whether `unit` is another home's, whose worker is to have it if it comes for it in time.

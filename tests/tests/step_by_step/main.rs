@@ -9,6 +9,7 @@ use std::sync::Barrier;
 use dualframe_core::frame::Frame;
 use dualframe_core::inbox::From;
 use dualframe_core::unit::{InteractionId, UnitId, Work};
+use dualframe_core::worker::Step;
 use dualframe_tests::watchdog;
 
 use crowd::{
@@ -40,7 +41,50 @@ fn a_probe_sees_every_work_unit() {
         let [a, b] = [0, 1].map(UnitId);
         let met = Work::Interact(InteractionId(0));
         let expected = [Work::Enter(a), Work::Enter(b), met, Work::Update(b), Work::Update(a)];
-        assert_eq!(alone(&mut pipeline, 0, &NEAR), expected, "what is carried, newest first");
+        assert_eq!(
+            alone(&mut pipeline, 0, &NEAR),
+            expected,
+            "updates that are carried, newest first"
+        );
+    });
+}
+
+#[test]
+fn interactions_of_the_next_frame_are_kept_while_there_are_updates() {
+    with(8, 1, 1, |mut pipeline, _| {
+        pipeline.run(2).expect("at rest");
+        let mut worker = pipeline.worker();
+        for met in 0..8 {
+            assert_eq!(worker.step(&NEAR), ENTERED);
+            // Nothing else is to be done yet; and then updates wait for them.
+            (0..met).for_each(|_| assert_eq!(worker.step(&NEAR), INTERACTED));
+        }
+        for _ in 0..7 {
+            assert_eq!([worker.step(&NEAR), worker.step(&NEAR)], [UPDATED, ENTERED]);
+        }
+        // Of the 21 that seven units have, 16 are kept.
+        (0..5).for_each(|_| assert_eq!(worker.step(&NEAR), INTERACTED));
+        assert_eq!([worker.step(&NEAR), worker.step(&NEAR)], [UPDATED, ENTERED]);
+        (0..16 + 7).for_each(|_| assert_eq!(worker.step(&NEAR), INTERACTED));
+        assert_eq!(worker.step(&NEAR), IDLE, "the next updates wait for renderings");
+    });
+}
+
+#[test]
+fn updates_at_home_come_before_interactions_of_the_next_frame() {
+    with(4, 2, 1, |mut pipeline, _| {
+        pipeline.run(2).expect("at rest");
+        let [mut a, mut b] = [0, 1].map(|home| pipeline.worker_at(home));
+        let mut steps = [0; 4];
+        while steps[2] == 0 {
+            let Ok(Step::Worked(stage)) = a.step(&NEAR) else { panic!("there is work") };
+            steps[stage as usize] += 1;
+        }
+        assert_eq!(steps, [4, 6, 1, 0], "both updates of the other home are queued there");
+        assert_eq!(a.step(&NEAR), ENTERED);
+        assert_eq!([b.step(&NEAR), b.step(&NEAR)], [UPDATED, ENTERED]);
+        assert_eq!(b.step(&NEAR), UPDATED, "though two of its units have met");
+        assert_eq!([b.step(&NEAR), b.step(&NEAR)], [ENTERED, INTERACTED]);
     });
 }
 
