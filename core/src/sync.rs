@@ -178,7 +178,8 @@ sites! {
     MAIL_PUSH = Release;
     /// Acquire: pairs with `MAIL_PUSH`.
     MAIL_TAKE = Acquire;
-    /// Relaxed: stamps a letter from outside; an older stamp only delivers it sooner.
+    /// Relaxed: stamps a letter from outside, and says which interactions others wait for; an older frame only
+    /// delivers sooner, or has what can be done in any order done in another.
     FRAME_OPEN_LOOK = Relaxed;
     /// Relaxed: see `FRAME_OPEN_LOOK`.
     FRAME_OPEN_SET = Relaxed;

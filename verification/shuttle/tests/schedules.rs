@@ -149,7 +149,7 @@ fn a_lost_wake_up_is_found_and_replayed() {
     let mut config = os::config();
     config.failure_persistence = FailurePersistence::File(Some(folder.clone()));
     let found = catch_unwind(move || {
-        Runner::new(RandomScheduler::new_from_seed(3, 5000), config).run(hasty);
+        Runner::new(RandomScheduler::new_from_seed(3, 100_000), config).run(hasty);
     });
     let failure = said(&*found.expect_err("the seeded bug was not noticed"));
     assert!(failure.contains("deadlock"), "failed for another reason: {failure}");
