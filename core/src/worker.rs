@@ -93,14 +93,14 @@ impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
         if let Work::Interact(id) = work {
             return self.interactions.push_back(id).is_ok();
         }
-        let fits = self.works.push(work).is_ok();
+        if self.works.push(work).is_err() {
+            return false;
+        }
         // A rendering stays on top: only holders can do it.
-        if let [.., below @ Work::Render(_), top] = self.works.as_mut_slice()
-            && fits
-        {
+        if let [.., below @ Work::Render(_), top] = self.works.as_mut_slice() {
             ::core::mem::swap(below, top);
         }
-        fits
+        true
     }
 
     /// The next that is carried, or an update at home: first what others wait for.

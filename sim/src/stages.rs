@@ -135,10 +135,10 @@ impl Stages {
 
     /// Updates the objects of a block.
     ///
-    /// `results` are the records of this frame's interactions of the block, of all, in any order; those of
-    /// other blocks are ignored. `mail` gives the messages to an object in the order in which they are to be processed:
-    /// by sender, then by order of posting. `post` is given (from, to, message) for each message that an
-    /// object sends.
+    /// `results` are the records of all interactions that the block, as it is, had in this frame, in any
+    /// order; what they say of other blocks is ignored. `mail` gives the messages to an object in the order
+    /// in which they are to be processed: by sender, then by order of posting. `post` is given (from, to,
+    /// message) for each message that an object sends.
     ///
     /// An object whose callback panics, whose state is not finite afterwards, or that is over budget
     /// is quarantined.
