@@ -41,6 +41,8 @@ pub struct StaticExecutor {
 struct Shared {
     blocks: Vec<RwLock<Block>>,
     found: Vec<Mutex<Vec<u32>>>,
+    /// Each thread's, for its share of the candidates.
+    outcomes: Vec<RwLock<Vec<Outcome>>>,
     outboxes: Vec<Mutex<Outbox>>,
     plan: RwLock<Plan>,
     barrier: Barrier,
@@ -69,7 +71,6 @@ struct Plan {
     partners: Partners,
     bounds: Vec<Bounds>,
     candidates: Candidates,
-    outcomes: Vec<RwLock<Outcome>>,
     mail: Mail,
 }
 
@@ -83,19 +84,22 @@ impl StaticExecutor {
         let frame = scene.frame;
         let world = World::new(scene, grain, threads)?;
         let count = world.blocks.len();
-        let outcome = |_| RwLock::new(Outcome::new());
         let plan = Plan {
             stages: world.stages,
             partners: world.partners,
             bounds: Vec::with_capacity(count),
             candidates: Candidates::new(count),
-            outcomes: (0..world::first_outcomes(count)).map(outcome).collect(),
             mail: world.mail,
         };
         let room = Room::of(world.blocks.iter());
+        let outcomes = || {
+            let first = world::first_outcomes(count).div_ceil(threads);
+            RwLock::new((0..first).map(|_| Outcome::new()).collect())
+        };
         let shared = Arc::new(Shared {
             blocks: world.blocks.into_iter().map(RwLock::new).collect(),
             found: (0..count).map(|_| Mutex::new(world::found_list())).collect(),
+            outcomes: (0..threads).map(|_| outcomes()).collect(),
             outboxes: (0..count).map(|_| Mutex::new(world::outbox(1))).collect(),
             plan: RwLock::new(plan),
             barrier: Barrier::new(threads),
@@ -215,20 +219,19 @@ impl Shared {
         for (first, found) in self.found.iter().enumerate() {
             plan.candidates.extend(first, &lock(found));
         }
-        let wanted = plan.candidates.pairs.len();
-        if plan.outcomes.len() < wanted {
-            plan.outcomes.resize_with(wanted, || RwLock::new(Outcome::new()));
-        }
     }
 
     fn interact(&self, worker: usize, scratch: &mut Scratch) {
         let _timer = self.time(worker, Stage::Interaction);
         let plan = read(&self.plan);
-        for place in self.share(worker, plan.candidates.pairs.len()) {
-            let [first, second] = plan.candidates.pairs[place];
+        let pairs = &plan.candidates.pairs[self.share(worker, plan.candidates.pairs.len())];
+        let mut outcomes = write(&self.outcomes[worker]);
+        if outcomes.len() < pairs.len() {
+            outcomes.resize_with(pairs.len(), Outcome::new);
+        }
+        for (&[first, second], outcome) in pairs.iter().zip(&mut *outcomes) {
             let other = (first != second).then(|| read(&self.blocks[second as usize]));
             let first = read(&self.blocks[first as usize]);
-            let mut outcome = write(&plan.outcomes[place]);
             outcome.compute(&plan.stages, &first, other.as_deref(), scratch);
         }
     }
@@ -239,10 +242,13 @@ impl Shared {
         let plan = read(&self.plan);
         let from_outside = self.outside.due(frame);
         let letters = |object| plan.mail.to(object).chain(from_outside.to(object));
-        let outcomes: Vec<_> =
-            plan.outcomes[..plan.candidates.pairs.len()].iter().map(read).collect();
+        let outcomes: Vec<_> = self.outcomes.iter().map(read).collect();
+        let pairs = plan.candidates.pairs.len();
         for index in self.share(worker, self.blocks.len()) {
-            let results = plan.candidates.of_block(index).map(|place| outcomes[place].records());
+            let results = plan.candidates.of_block(index).map(|place| {
+                let sharer = self.sharer(place, pairs);
+                outcomes[sharer][place - self.share(sharer, pairs).start].records()
+            });
             let mut outbox = lock(&self.outboxes[index]);
             let mut post = |from, to, message| outbox.push((from, to, message));
             let mut block = write(&self.blocks[index]);
@@ -261,17 +267,23 @@ impl Shared {
         items * worker / workers..items * (worker + 1) / workers
     }
 
+    /// The worker whose part of so many items the one at `place` is in.
+    fn sharer(&self, place: usize, items: usize) -> usize {
+        ((place + 1) * self.clocks.len() - 1) / items
+    }
+
     /// What the last frame's interactions counted; its messages go to the mail.
     fn finish(&self) -> PairCount {
         let mut plan = write(&self.plan);
         for outbox in &self.outboxes {
             world::empty_into(&mut lock(outbox), &mut plan.mail);
         }
-        let done = plan.outcomes.iter().take(plan.candidates.pairs.len());
-        done.fold(PairCount::default(), |mut sum, outcome| {
-            sum += read(outcome).pairs;
-            sum
-        })
+        let mut sum = PairCount::default();
+        for (worker, outcomes) in self.outcomes.iter().enumerate() {
+            let share = self.share(worker, plan.candidates.pairs.len());
+            read(outcomes).iter().take(share.len()).for_each(|outcome| sum += outcome.pairs);
+        }
+        sum
     }
 }
 

@@ -21,34 +21,22 @@ use crate::object::ObjectId;
 use crate::render::Renderer;
 use crate::stages::{PairCount, Stages};
 
-/// What the workers of a run share.
-pub(super) struct Shared<'s> {
-    pub(super) stages: &'s Stages,
-    outside: &'s Outside,
-    /// The number of the pipeline's frame 0.
-    pub(super) first_frame: u64,
-    /// What each worker makes room for.
-    room: Room,
-    /// The unit that each object is in. Changed only between runs.
-    unit_of: Vec<AtomicU32>,
-}
+/// Which unit each object is in, by the objects' numbers. Changed only between runs.
+pub(super) struct Register(Vec<AtomicU32>);
 
-impl<'s> Shared<'s> {
-    pub(super) fn new(
-        stages: &'s Stages,
-        outside: &'s Outside,
-        first_frame: u64,
-        blocks: &[Block],
-    ) -> Self {
-        let objects = || blocks.iter().flat_map(Block::objects);
-        let unit_of = objects().map(|_| AtomicU32::new(0)).collect();
-        Self { stages, outside, first_frame, room: Room::of(blocks.iter()), unit_of }
+impl Register {
+    /// The objects of these blocks in the units of the same numbers.
+    pub(super) fn new(blocks: &[Block]) -> Self {
+        let objects = blocks.iter().flat_map(Block::objects);
+        let register = Self(objects.map(|_| AtomicU32::new(0)).collect());
+        blocks.iter().enumerate().for_each(|(unit, block)| register.locate(unit, block));
+        register
     }
 
     /// Notes that the objects of `block` are in unit `unit`.
     pub(super) fn locate(&self, unit: usize, block: &Block) {
         for object in block.objects() {
-            if let Some(place) = self.unit_of.get(object.id().0 as usize) {
+            if let Some(place) = self.0.get(object.id().0 as usize) {
                 // Relaxed, as is the load: the pipeline's lock separates runs from changes.
                 place.store(unit as u32, Ordering::Relaxed);
             }
@@ -57,10 +45,24 @@ impl<'s> Shared<'s> {
 
     /// The unit that `object` is in, if there is such an object.
     pub(super) fn unit_of(&self, object: ObjectId) -> Option<UnitId> {
-        let place = self.unit_of.get(object.0 as usize)?;
+        let place = self.0.get(object.0 as usize)?;
         Some(UnitId(place.load(Ordering::Relaxed)))
     }
+}
 
+/// What the workers of a run share.
+#[derive(Clone, Copy)]
+pub(super) struct Shared<'s> {
+    pub(super) stages: &'s Stages,
+    pub(super) outside: &'s Outside,
+    pub(super) register: &'s Register,
+    /// The number of the pipeline's frame 0.
+    pub(super) first_frame: u64,
+    /// What each worker makes room for.
+    pub(super) room: Room,
+}
+
+impl Shared<'_> {
     fn number(&self, frame: Frame) -> u64 {
         self.first_frame + u64::from(frame.0)
     }
@@ -199,7 +201,7 @@ impl<'s> Environment for Host<'s> {
         let mut outcome = Ok(());
         let mut post = |from: ObjectId, to: ObjectId, message| {
             // A letter to nobody is lost, as `Input::post` says.
-            let Some(unit) = shared.unit_of(to) else { return };
+            let Some(unit) = shared.register.unit_of(to) else { return };
             if let Err(rejected) = inputs.post(unit, from.0, Parcel { to, message }) {
                 outcome = Err(rejected.full);
             }

@@ -18,12 +18,13 @@ use dualframe_core::pipeline::{BroadPhase, Config, MOST_HOMES, Pipeline};
 
 pub use dualframe_core::frame::Entry;
 
-use self::host::{Parcel, Screen, Shared};
+use self::host::{Parcel, Register, Screen, Shared};
 use self::memory::{Tables, modelled_interactions, spare_interactions};
 use self::run::{Context, End, Regrouping, Report};
 use self::team::Team;
 use super::outside::Outside;
 use super::{Executor, ExecutorError, FrameRecord, StageSeconds, world};
+use crate::behavior::Room;
 use crate::block::Block;
 use crate::blocking::{Blocking, Grain};
 use crate::mailbox::Mailbox;
@@ -42,6 +43,8 @@ pub struct PipelineExecutor {
     blocks: Vec<Block>,
     blocking: Blocking,
     tables: Tables,
+    register: Register,
+    room: Room,
     config: Config,
     grain: Grain,
     pool: Arc<Pool>,
@@ -89,6 +92,8 @@ impl PipelineExecutor {
         });
         Ok(Self {
             tables: Tables::new(&blocks, interactions, mail.len(), homes),
+            register: Register::new(&blocks),
+            room: Room::of(blocks.iter()),
             stages,
             blocks,
             blocking,
@@ -113,7 +118,13 @@ impl PipelineExecutor {
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<End, ExecutorError> {
         let most_contacts = self.tables.contact_capacity() / 2;
-        let shared = Shared::new(&self.stages, &self.outside, self.frame, &self.blocks);
+        let shared = Shared {
+            stages: &self.stages,
+            outside: &self.outside,
+            register: &self.register,
+            first_frame: self.frame,
+            room: self.room,
+        };
         self.tables.load(&mut self.blocks);
         let crew = Crew::default();
         let pipeline = Pipeline::new(self.tables.lend(), self.config, &crew)?;

@@ -56,7 +56,7 @@ impl Regrouping<'_> {
     ) -> Result<(), TableFull> {
         for (from, parcel) in self.mail.drain(..) {
             // A message to nobody is lost.
-            if let Some(unit) = shared.unit_of(parcel.to) {
+            if let Some(unit) = shared.register.unit_of(parcel.to) {
                 pipeline.post(unit, from, parcel).map_err(|rejected| rejected.full)?;
             }
         }
@@ -89,7 +89,7 @@ impl Regrouping<'_> {
         blocking.deal(self.homes);
         for (index, unit) in pipeline.objects_mut().enumerate() {
             blocking.fill(index, &mut unit.block);
-            shared.locate(index, &unit.block);
+            shared.register.locate(index, &unit.block);
         }
         self.settle(pipeline);
         self.take_mail(pipeline);
@@ -130,9 +130,6 @@ impl<'s> Context<'s, '_> {
         mut regrouping: Regrouping<'_>,
         screen: Screen<'s>,
     ) -> (u64, End) {
-        for (index, unit) in pipeline.objects_mut().enumerate() {
-            self.shared.locate(index, &unit.block);
-        }
         regrouping.settle(&mut pipeline);
         if let Err(full) = regrouping.post_mail(self.shared, &pipeline) {
             self.fail(full);
