@@ -2,7 +2,8 @@
 //!
 //! Frames run in batches of up to [`FRAMES_PER_BLOCKING`](crate::blocking::FRAMES_PER_BLOCKING). Between two
 //! batches the pipeline is at rest: blocks are formed anew before every frame whose number is a multiple of it,
-//! tables grow if they have come to be half full, threads join. Threads, and the memory they work in, are kept from one run to the next.
+//! tables grow if they have come to be half full, threads join. Threads, and the memory they work in, are
+//! kept from one run to the next.
 
 mod clock;
 mod host;
