@@ -1,19 +1,51 @@
 //! Threads and what they work in, kept from run to run: to start a thread takes longer than a frame.
 
 use std::sync::{Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
 
-use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
+use rayon::{Scope, ThreadBuilder, ThreadPool, ThreadPoolBuilder};
 
 use super::host::Own;
 use crate::executor::ExecutorError;
 
-/// The hired threads, and what each worker works in. They are Rayon's, asleep between two runs; of it
-/// only the lending of borrowed work to threads that last is used here.
+/// The hired threads, and what each worker works in.
 #[derive(Default)]
 pub(super) struct Team {
-    hired: Option<ThreadPool>,
+    hired: Option<Hired>,
     /// By the workers' numbers; none for who has not worked yet, or is at work.
     own: Vec<Mutex<Option<Own>>>,
+}
+
+/// Threads that are Rayon's, asleep between two runs; of it only the lending of borrowed work to threads
+/// that last is used here. None outlives this.
+struct Hired {
+    /// There until this is dropped.
+    pool: Option<ThreadPool>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Hired {
+    fn new(count: usize) -> Result<Self, ExecutorError> {
+        let mut threads = Vec::with_capacity(count);
+        let start = |worker: ThreadBuilder| {
+            let name = format!("worker {}", worker.index() + 1);
+            threads.push(thread::Builder::new().name(name).spawn(|| worker.run())?);
+            Ok(())
+        };
+        let pool = ThreadPoolBuilder::new().num_threads(count).spawn_handler(start).build()?;
+        Ok(Self { pool: Some(pool), threads })
+    }
+}
+
+impl Drop for Hired {
+    fn drop(&mut self) {
+        // That tells them to end.
+        self.pool = None;
+        for thread in self.threads.drain(..) {
+            // What panics in borrowed work has come out of `work` already.
+            let _ = thread.join();
+        }
+    }
 }
 
 impl Team {
@@ -31,9 +63,7 @@ impl Team {
             return Ok(());
         }
         if workers > 1 {
-            let name = |index| format!("worker {}", index + 1);
-            let pool = ThreadPoolBuilder::new().num_threads(workers - 1).thread_name(name);
-            self.hired = Some(pool.build()?);
+            self.hired = Some(Hired::new(workers - 1)?);
         }
         self.own.resize_with(workers, Mutex::default);
         Ok(())
@@ -42,9 +72,10 @@ impl Team {
     /// Calls `lead` on the calling thread and `attend`, with their numbers, on all others at once;
     /// returns when all have.
     pub(super) fn work<R>(&self, attend: impl Fn(usize) + Sync, lead: impl FnOnce() -> R) -> R {
-        let Some(hired) = &self.hired else { return lead() };
+        let hired = self.hired.as_ref().and_then(|hired| hired.pool.as_ref());
+        let Some(pool) = hired else { return lead() };
         let attend = &attend;
-        hired.in_place_scope(|scope: &Scope<'_>| {
+        pool.in_place_scope(|scope: &Scope<'_>| {
             for index in 1..self.own.len() {
                 scope.spawn(move |_| attend(index));
             }
@@ -68,9 +99,12 @@ impl Team {
 
 #[cfg(test)]
 mod tests {
+    use std::cell::RefCell;
     use std::collections::HashSet;
-    use std::sync::Barrier;
-    use std::thread::{self, ThreadId};
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::sync::{Arc, Barrier};
+    use std::thread::ThreadId;
+    use std::time::Duration;
 
     use super::*;
 
@@ -93,6 +127,37 @@ mod tests {
 
     fn threads(attendants: &[(usize, ThreadId)]) -> HashSet<ThreadId> {
         attendants.iter().map(|&(_, thread)| thread).collect()
+    }
+
+    /// Says so when the thread that it is a part of has ended.
+    struct Ending(Arc<AtomicUsize>);
+
+    impl Drop for Ending {
+        fn drop(&mut self) {
+            // Long enough for whoever does not wait to be seen not to.
+            thread::sleep(Duration::from_millis(50));
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    thread_local! {
+        static ENDING: RefCell<Option<Ending>> = const { RefCell::new(None) };
+    }
+
+    #[test]
+    fn no_thread_outlives_its_team() {
+        let ended = Arc::new(AtomicUsize::new(0));
+        let mut team = Team::default();
+        team.grow(3).expect("threads");
+        let all = Barrier::new(3);
+        let attend = |_| {
+            ENDING.set(Some(Ending(Arc::clone(&ended))));
+            all.wait();
+        };
+        team.work(attend, || all.wait());
+        assert_eq!(ended.load(Ordering::Relaxed), 0);
+        drop(team);
+        assert_eq!(ended.load(Ordering::Relaxed), 2);
     }
 
     #[test]
