@@ -1,72 +1,54 @@
 //! Who has arrived in this frame: each pair meets exactly once, at its second arriver.
 //!
-//! A unit arrives by one CAS that writes it into the first free cell of the frame's list; the cells
-//! before it *are* the list of those it must be tested against. Of any two units one comes later in
-//! the list, and only that one finds the other before it: every pair meets exactly once, with no gate,
-//! no sort and no wait. Cells are words side by side, so that a long list is read as fast as memory
-//! gives it, where links from unit to unit would be followed one miss after the other; and any number
-//! of units fits, where a set of bits would need a word for every pair of groups beyond the word's
+//! A unit looks through the frame's list from its beginning, meets whoever is there, and arrives by one
+//! CAS that writes it into the first free cell; who comes before it *are* those it was to meet. Of any two
+//! units one comes later in the list, and only that one meets the other: every pair meets exactly once,
+//! with no gate, no sort and no wait. Cells are words side by side, so that a long list is read as fast as
+//! memory gives it, where links from unit to unit would be followed one miss after the other; and any
+//! number of units fits, where a set of bits would need a word for every pair of groups beyond the word's
 //! width.
 //!
-//! No state is half written: the CAS publishes, then anyone may help the end of the list on.
+//! No state is half written, and nothing is tried twice: who loses a cell meets its winner, and goes on to
+//! the next.
 
 use crate::frame::Frame;
 use crate::ring::QueueSlot;
-use crate::sync::{AtomicWord, CachePadded, seeded, site, spin_hint};
+use crate::sync::{seeded, site};
 
 /// The frame's arrivals. A cell holds a unit's index and, in its lowest bit, the parity of the frame
 /// that the unit arrived in: every unit arrives in every frame, so a cell that is not yet written in
-/// this frame was written in the one before.
+/// this frame was written in the one before, and is free.
 #[derive(Debug)]
 pub struct Arrivals<'m> {
     cells: &'m [QueueSlot],
-    /// The first free cell; may lag by one arrival that has not been helped on yet.
-    end: CachePadded<AtomicWord>,
 }
 
 impl<'m> Arrivals<'m> {
     /// Nobody has arrived in a frame of even number; a cell for each unit that ever arrives.
     pub fn new(cells: &'m mut [QueueSlot]) -> Self {
         cells.iter().for_each(|cell| cell.0.store(1, site::EXCLUSIVE));
-        Self { cells, end: CachePadded::new(AtomicWord::new(0)) }
+        Self { cells }
     }
 
-    /// Arrives as `index` and returns those that arrived before in this frame, oldest first.
+    /// Calls `meet` with each that arrived before in this frame, oldest first, and arrives as `index`.
+    /// Nobody arrives in a frame before all have arrived in the one before.
     ///
     /// The caller sees all that they did before they arrived.
     #[inline]
-    pub fn arrive(&self, index: u32, frame: Frame) -> impl Iterator<Item = u32> + use<'m> {
+    pub fn arrive(&self, index: u32, frame: Frame, mut meet: impl FnMut(u32)) {
         let word = (index as usize) << 1 | frame.parity();
-        let place = loop {
-            let end = self.end.load(site::ARRIVALS_END_LOAD);
-            // There is a cell for each unit that arrives.
-            let Some(cell) = self.cells.get(end) else { break end };
-            let seen = cell.0.load(site::ARRIVALS_LOOK);
-            // Last frame's cell is free. Publishing is this one CAS.
+        // There is a cell for each unit that arrives.
+        for cell in self.cells {
+            let mut seen = cell.0.load(site::ARRIVALS_READ);
             if seen & 1 != frame.parity() {
+                // Publishing is this one CAS.
                 let published = cell.0.exchange(seen, word, site::ARRIVALS_PUBLISH).is_ok();
                 if published || seeded!(ArrivalNotRetried) {
-                    self.help_end(end);
-                    break end;
+                    return;
                 }
+                seen = cell.0.load(site::ARRIVALS_READ);
             }
-            // This frame's already: who wrote it has not moved the end yet.
-            self.help_end(end);
-            spin_hint();
-        };
-        let earlier = self.cells.get(..place).unwrap_or_default();
-        earlier.iter().map(|cell| (cell.0.load(site::ARRIVALS_READ) >> 1) as u32)
-    }
-
-    fn help_end(&self, end: usize) {
-        // Failure means that somebody else helped; either way the end has moved on.
-        let _ = self.end.exchange(end, end + 1, site::ARRIVALS_END_HELP);
-    }
-
-    /// Forgets all. Only when every arriver of the frame has read its list to the end, and
-    /// before any arrives in the next.
-    #[inline]
-    pub fn clear(&self) {
-        self.end.store(0, site::ARRIVALS_RESET);
+            meet((seen >> 1) as u32);
+        }
     }
 }

@@ -67,14 +67,14 @@ impl Default for SegmentSlot {
 /// How much of a frame's table is taken, and how much more was asked for.
 #[derive(Debug)]
 pub(crate) struct Room {
-    used: CachePadded<Atomic>,
+    used: Atomic,
     /// Slots that were asked for in vain. It only serves to name the capacity needed.
     refused: Atomic,
 }
 
 impl Room {
     pub(crate) fn new() -> Self {
-        Self { used: CachePadded::new(Atomic::new(0)), refused: Atomic::new(0) }
+        Self { used: Atomic::new(0), refused: Atomic::new(0) }
     }
 
     pub(crate) fn reset(&self) {
@@ -135,14 +135,14 @@ impl Room {
 pub(crate) struct Pools<'m, C> {
     contacts: &'m [ContactSlot<C>],
     segments: &'m [SegmentSlot],
-    rooms: [Room; 2],
+    rooms: [CachePadded<Room>; 2],
     /// Slots of one frame.
     half: u32,
 }
 
 impl<'m, C: Copy> Pools<'m, C> {
     pub(crate) fn new(contacts: &'m [ContactSlot<C>], segments: &'m [SegmentSlot]) -> Self {
-        let rooms = [Room::new(), Room::new()];
+        let rooms = [Room::new(), Room::new()].map(CachePadded::new);
         let half = (contacts.len().min(segments.len()) / 2) as u32;
         Self { contacts, segments, rooms, half }
     }

@@ -31,13 +31,6 @@ impl Countdown {
         self.0.fetch_sub(1, site::COUNTDOWN_ARRIVE) == 1
     }
 
-    /// Expects `arrivals` more. The caller must hold an arrival that has not been made yet, or
-    /// the countdown might have ended already.
-    #[inline]
-    pub fn add(&self, arrivals: u32) {
-        self.0.fetch_add(arrivals, site::COUNTDOWN_ADD);
-    }
-
     /// Starts again at `arrivals`. Only the last arriver may, before it lets anyone arrive anew.
     #[inline]
     pub fn arm(&self, arrivals: u32) {

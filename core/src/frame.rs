@@ -50,9 +50,6 @@ pub enum Entry {
 /// The frame-wide countdowns, and how far frames have come.
 #[derive(Debug)]
 pub(crate) struct Window {
-    /// Units that have not entered the frame being gathered. Its last arriver opens the frame:
-    /// updates of it may start, and no update of the frame before is left.
-    pub(crate) gate: CachePadded<Countdown>,
     /// Units not yet rendered in the frame on display.
     pub(crate) renders: CachePadded<Countdown>,
     /// The frame being rendered: every frame before it is swapped.
@@ -67,7 +64,6 @@ pub(crate) struct Window {
 impl Window {
     pub(crate) fn new(units: u32) -> Self {
         Self {
-            gate: CachePadded::new(Countdown::new(units)),
             renders: CachePadded::new(Countdown::new(units)),
             display: CachePadded::new(Atomic::new(0)),
             open: CachePadded::new(Atomic::new(u32::MAX)),
@@ -91,9 +87,8 @@ impl Window {
         }
     }
 
-    /// `frame` has been gathered; the gate now gathers the next one.
+    /// `frame` has been gathered.
     pub(crate) fn opened(&self, frame: Frame) {
-        self.gate.arm(self.units);
         self.open.store(frame.0, site::FRAME_OPEN_SET);
     }
 

@@ -53,7 +53,7 @@ impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
         &self,
     ) -> impl Iterator<Item = Interacted<'t, 'm, E::Interaction, E::Contact>> + use<'t, 'm, E> {
         let (tables, unit) = (self.tables, self.unit);
-        let mut next = tables.unit(unit).candidates.load(site::CANDIDATE_HEAD);
+        let mut next = tables.unit(unit).pending.first();
         ::core::iter::from_fn(move || {
             if next == NONE {
                 return None;

@@ -56,7 +56,7 @@ faults! {
     UpdatesAfterOwnTests;
     /// Trap 2: an update does not wait for the unit's rendering in the frame before.
     RenderingNotAwaited;
-    /// Trap 2: a unit's countdown is armed after the unit was passed on.
+    /// Trap 2: a unit's countdown is armed, and its candidates emptied, after the unit was passed on.
     PendingArmedLate;
     /// Trap 3: a unit is rendered before the frame before is swapped.
     RenderedBeforeSwap;
@@ -88,8 +88,6 @@ faults! {
     TagNotChecked;
     /// A worker leaves with what it carries.
     LeavesWithCarry;
-    /// A unit's candidates are emptied after the unit was passed on.
-    CandidatesEmptiedLate;
     /// The gate is armed again after the frame's updates were let go.
     GateArmedLate;
     /// The countdown of renderings is armed again after the next frame is on display.

@@ -57,6 +57,7 @@ pub mod instrument;
 pub mod latest;
 mod list;
 pub mod migrate;
+mod pending;
 pub mod pipeline;
 pub mod probe;
 mod protocol;

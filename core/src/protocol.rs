@@ -65,13 +65,13 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
                 if env.interacts_within(object) {
                     meet(unit, out);
                 }
-                for other in self.tables.arrivals.arrive(unit.0, self.next_frame(unit)).map(UnitId)
-                {
-                    let met = &self.tables.unit(other).object;
+                self.tables.gathering.arrivals.arrive(unit.0, self.next_frame(unit), |earlier| {
+                    let earlier = UnitId(earlier);
+                    let met = &self.tables.unit(earlier).object;
                     if met.with(|object_met| env.broad_phase(object, object_met)) {
-                        meet(other, out);
+                        meet(earlier, out);
                     }
-                }
+                });
             });
         }
         self.found(unit, &found, out).and(outcome)
@@ -135,11 +135,9 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
             let other = self.tables.interaction(id).other(unit);
             if other != unit && !seeded!(CountedAtOneEnd) {
                 self.tables.push_candidates(&[id], other);
-                self.tables.unit(other).pending.add(1);
             }
         }
         self.tables.push_candidates(ids, unit);
-        self.tables.unit(unit).pending.add(ids.len() as u32);
         if !seeded!(CountedAfterEmitted) {
             ids.iter().for_each(|&id| out.emit(Work::Interact(id)));
         }
@@ -153,12 +151,11 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         if seeded!(UpdatesAfterOwnTests) {
             self.ready(unit, out);
         }
-        if !self.window.gate.arrive() {
+        if !self.tables.gathering.gate.arrive() {
             return;
         }
-        self.tables.arrivals.clear();
         self.tables.reset_pools(if seeded!(PoolsResetEarly) { frame } else { frame.next() });
-        self.window.opened(frame);
+        self.opened(frame);
         if seeded!(UpdatesAfterOwnTests) {
             return;
         }
@@ -169,8 +166,14 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
             }
         }
         if seeded!(GateArmedLate) {
-            self.window.opened(frame);
+            self.opened(frame);
         }
+    }
+
+    /// `frame` has been gathered; the gate now gathers the next one.
+    fn opened(&self, frame: Frame) {
+        self.tables.gathering.gate.arm(self.tables.units.len() as u32);
+        self.window.opened(frame);
     }
 
     /// One thing less that `unit`'s update waits for.
@@ -226,7 +229,6 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         let outcome =
             unsafe { slot.object.with_mut(|object| env.update(unit, frame, object, &mut inputs)) };
         drop(inputs);
-        slot.candidates.store(NONE, site::CANDIDATE_HEAD);
         // The next update waits for its frame's opening and for this frame's rendering. Stored
         // before the unit is passed on to either.
         slot.pending.arm(if seeded!(RenderingNotAwaited) { 1 } else { 2 });
@@ -241,9 +243,6 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         }
         if seeded!(PendingArmedLate) {
             slot.pending.arm(2);
-        }
-        if seeded!(CandidatesEmptiedLate) {
-            slot.candidates.store(NONE, site::CANDIDATE_HEAD);
         }
         outcome
     }

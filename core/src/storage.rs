@@ -5,6 +5,7 @@ use crate::contacts::{ContactSlot, SegmentSlot};
 use crate::countdown::Countdown;
 use crate::environment::Environment;
 use crate::inbox::{Inbox, LetterSlot};
+use crate::pending::Pending;
 use crate::ring::{QueueSlot, slots_for};
 use crate::sync::{Atomic, Cell, const_fn, site};
 use crate::unit::{NONE, UnitId};
@@ -15,14 +16,12 @@ use crate::unit::{NONE, UnitId};
 #[repr(C, align(128))]
 pub struct UnitSlot<O> {
     /// What has to happen before the unit's next update: its interactions, the opening of the
-    /// frame, and its rendering in the frame before.
-    pub(crate) pending: Countdown,
+    /// frame, and its rendering in the frame before; and the list of the interactions.
+    pub(crate) pending: Pending,
     /// The frame of the unit's next update.
     pub(crate) frame: Atomic,
     /// Whose it is, in the pipeline at hand: see [`Config::homes`](crate::pipeline::Config::homes).
     pub(crate) home: Atomic,
-    /// First of this frame's candidates.
-    pub(crate) candidates: Atomic,
     /// First of the modelled interactions.
     pub(crate) modelled: Atomic,
     pub(crate) inbox: Inbox,
@@ -38,10 +37,9 @@ impl<O> UnitSlot<O> {
         /// A unit that may interact.
         pub const fn new(object: O) -> Self {
             Self {
-                pending: Countdown::new(0),
+                pending: Pending::new(0),
                 frame: Atomic::new(0),
                 home: Atomic::new(0),
-                candidates: Atomic::new(NONE),
                 modelled: Atomic::new(NONE),
                 inbox: Inbox::new(),
                 solitary: false,

@@ -139,32 +139,21 @@ sites! {
     RING_HEAD_CLAIM = Relaxed;
     /// Acquire and Release: the last arriver must see what all others did before they arrived.
     COUNTDOWN_ARRIVE = AcqRel;
-    /// Relaxed: the counter cannot reach zero meanwhile, and whoever could take it there is
-    /// ordered after this by the hold that keeps it up.
-    COUNTDOWN_ADD = Relaxed;
     /// Relaxed: nobody arrives before the re-armed counter was published by something else.
     COUNTDOWN_ARM = Relaxed;
-    /// Acquire: pairs with `ARRIVALS_END_HELP`. Whoever sees this end also sees the cells before it
-    /// written in this frame.
-    ARRIVALS_END_LOAD = Acquire;
-    /// Relaxed: re-validated by the CAS that follows.
-    ARRIVALS_LOOK = Relaxed;
     /// Release: an arriver's object is read by those after it.
     ARRIVALS_PUBLISH = Release;
-    /// Release: the cell below the new end was written, or seen written, before.
-    ARRIVALS_END_HELP = Release;
     /// Acquire: pairs with `ARRIVALS_PUBLISH`.
     ARRIVALS_READ = Acquire;
-    /// Relaxed: nobody arrives before the frame's gate was opened, which publishes this.
-    ARRIVALS_RESET = Relaxed;
     /// Relaxed: lists of candidates and letters are walked only by the unit's updater, after
     /// its countdown ended.
     LIST_LINK = Relaxed;
     /// Relaxed: see `LIST_LINK`.
     LIST_FOLLOW = Relaxed;
-    /// Relaxed: candidates are pushed before the gate opens, walked after it.
+    /// Relaxed: the count cannot reach zero meanwhile, and whoever could take it there, to walk the list,
+    /// is ordered after this by the hold that keeps it up.
     CANDIDATE_PUSH = Relaxed;
-    /// Relaxed: exclusive to the updater.
+    /// Relaxed: re-validated by the CAS that follows, or exclusive to the updater.
     CANDIDATE_HEAD = Relaxed;
     /// Relaxed: what an interaction slot says of its pair is published by the queue or the gate.
     SLOT_FIELD = Relaxed;

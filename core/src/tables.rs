@@ -4,14 +4,16 @@ use ::core::num::NonZeroU32;
 
 use crate::arrivals::Arrivals;
 use crate::contacts::{Pools, Room};
+use crate::countdown::Countdown;
 use crate::environment::Environment;
 use crate::error::{SetupError, Table, TableFull};
 use crate::frame::Frame;
 use crate::inbox::{From, Post, Rejected};
 use crate::list;
+use crate::pending::Pending;
 use crate::ring::{IndexRing, QueueSlot, slots_for};
 use crate::storage::{Chain, InteractionSlot, Memory, UnitSlot, at, queue_slots};
-use crate::sync::site;
+use crate::sync::{CachePadded, site};
 use crate::unit::{InteractionId, NONE, UnitId};
 
 /// The most homes that units are shared out to; workers beyond their number share them.
@@ -81,6 +83,19 @@ pub(crate) struct Queues<'m> {
     pub(crate) render: [IndexRing<'m>; 2],
 }
 
+/// The frame being gathered. Whoever enters it writes to all of this: it is in one cache line, that
+/// one worker after the other fetches once.
+#[derive(Debug)]
+pub(crate) struct Gathering<'m> {
+    /// Units that have entered it.
+    pub(crate) arrivals: Arrivals<'m>,
+    /// Units that have not. The last one opens the frame: updates of it may start, and no update of
+    /// the frame before is left.
+    pub(crate) gate: Countdown,
+    /// Candidate slots claimed in each frame in flight (spatial broad phase).
+    found: [Room; 2],
+}
+
 /// Everything that outlives a frame.
 pub(crate) struct Tables<'m, E: Environment + ?Sized> {
     pub(crate) units: &'m [UnitSlot<E::Object>],
@@ -88,9 +103,7 @@ pub(crate) struct Tables<'m, E: Environment + ?Sized> {
     pub(crate) pools: Pools<'m, E::Contact>,
     pub(crate) post: Post<'m, E::Message>,
     pub(crate) queues: Queues<'m>,
-    pub(crate) arrivals: Arrivals<'m>,
-    /// Candidate slots claimed in each frame in flight (spatial broad phase).
-    found: [Room; 2],
+    pub(crate) gathering: CachePadded<Gathering<'m>>,
 }
 
 /// The largest table whose indices leave room for `NONE` and for doubling.
@@ -111,7 +124,7 @@ impl<'m, E: Environment> Tables<'m, E> {
             return Err(SetupError::NoUnits);
         }
         check(Table::Units, MOST, units.len())?;
-        check(Table::Interactions, MOST, interactions.len())?;
+        check(Table::Interactions, MOST.min(Pending::MOST_INTERACTIONS), interactions.len())?;
         check(Table::Contacts, MOST, contacts.len())?;
         check(Table::Letters, MOST, letters.len())?;
         let needed = queue_slots(units.len(), interactions.len(), letters.len(), homes);
@@ -122,7 +135,6 @@ impl<'m, E: Environment> Tables<'m, E> {
         }
         for unit in units.iter_mut() {
             unit.frame.store(0, site::EXCLUSIVE);
-            unit.candidates.store(NONE, site::EXCLUSIVE);
             unit.modelled.store(NONE, site::EXCLUSIVE);
             unit.inbox = crate::inbox::Inbox::new();
             // No rendering precedes the first update: it waits for the frame's opening only.
@@ -150,15 +162,18 @@ impl<'m, E: Environment> Tables<'m, E> {
             render: [ring(units.len())?, ring(units.len())?],
         };
         let post = Post::new(letters, slots(letters.len()))?;
-        let arrivals = Arrivals::new(rest.get_mut(..units.len()).unwrap_or_default());
+        let gathering = Gathering {
+            arrivals: Arrivals::new(rest.get_mut(..units.len()).unwrap_or_default()),
+            gate: Countdown::new(units.len() as u32),
+            found: [Room::new(), Room::new()],
+        };
         let mut tables = Self {
             units,
             interactions,
             pools: Pools::new(contacts, segments),
             post,
             queues,
-            arrivals,
-            found: [Room::new(), Room::new()],
+            gathering: CachePadded::new(gathering),
         };
         let homes = u64::from(tables.queues.homes.count().get());
         let shared = |unit: UnitId| (u64::from(unit.0) * homes).checked_div(units.len() as u64);
@@ -245,7 +260,7 @@ impl<'m, E: Environment + ?Sized> Tables<'m, E> {
         frame: Frame,
     ) -> (impl Iterator<Item = InteractionId> + use<E>, Result<(), TableFull>) {
         let half = (self.interactions.len() / 2) as u32;
-        let room = &self.found[frame.parity()];
+        let room = &self.gathering.found[frame.parity()];
         let (claimed, outcome) = room.claim_some(count, half, Table::Interactions);
         let first = frame.parity() as u32 * half;
         (claimed.map(move |place| InteractionId(first + place)), outcome)
@@ -253,49 +268,42 @@ impl<'m, E: Environment + ?Sized> Tables<'m, E> {
 
     /// Candidate slots that `frame` has claimed so far.
     pub(crate) fn candidates_used(&self, frame: Frame) -> u32 {
-        self.found[frame.parity()].used()
+        self.gathering.found[frame.parity()].used()
     }
 
     /// Empties what belonged to the frame before last, of the same parity as `frame`.
     pub(crate) fn reset_pools(&self, frame: Frame) {
-        self.found[frame.parity()].reset();
+        self.gathering.found[frame.parity()].reset();
         self.pools.reset(frame);
     }
 
-    /// Puts `ids` onto `unit`'s list of this frame's candidates.
+    /// Puts `ids` onto `unit`'s list of this frame's candidates; its update waits for them.
     pub(crate) fn push_candidates(&self, ids: &[InteractionId], unit: UnitId) {
         let [first, .., last] = ids else {
-            return ids.iter().for_each(|&only| self.push_chain(only, only, unit));
+            return ids.iter().for_each(|&only| self.push_chain(only, only, 1, unit));
         };
         for link in ids.windows(2) {
             self.interaction(link[0]).set_next(Chain::Candidates, unit, link[1].0);
         }
-        self.push_chain(*first, *last, unit);
+        self.push_chain(*first, *last, ids.len() as u32, unit);
     }
 
-    /// Puts what is linked from `first` to `last` onto `unit`'s list.
-    fn push_chain(&self, first: InteractionId, last: InteractionId, unit: UnitId) {
-        let head = &self.unit(unit).candidates;
-        let mut next = head.load(site::LIST_FOLLOW);
-        loop {
-            self.interaction(last).set_next(Chain::Candidates, unit, next);
-            match head.exchange(next, first.0, site::CANDIDATE_PUSH) {
-                Ok(_) => return,
-                Err(found) => next = found,
-            }
-        }
+    /// Puts what is linked from `first` to `last`, `count` of them, onto `unit`'s list.
+    fn push_chain(&self, first: InteractionId, last: InteractionId, count: u32, unit: UnitId) {
+        let link = |next| self.interaction(last).set_next(Chain::Candidates, unit, next);
+        self.unit(unit).pending.push(first, count, link);
     }
 
     /// Brings `unit`'s candidates into pair order. The caller has the unit exclusively.
     pub(crate) fn sort_candidates(&self, unit: UnitId) {
-        let head = &self.unit(unit).candidates;
+        let pending = &self.unit(unit).pending;
         let slot = |index| self.interaction(InteractionId(index));
         let first = list::sort(
-            head.load(site::CANDIDATE_HEAD),
+            pending.first(),
             |index| slot(index).next(Chain::Candidates, unit),
             |index, to| slot(index).set_next(Chain::Candidates, unit, to),
             |a, b| (slot(a).other(unit), a) < (slot(b).other(unit), b),
         );
-        head.store(first, site::CANDIDATE_HEAD);
+        pending.set_first(first);
     }
 }

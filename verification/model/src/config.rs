@@ -33,7 +33,7 @@ pub enum Bug {
     CountedAfterGate,
     /// A unit's update does not wait for the others' entries.
     NoGate,
-    /// The arrivals are forgotten after the frame was opened, not before.
+    /// A frame's arrivals still count when the next one's first units enter.
     ArrivalsClearedLate,
     /// The gate is armed again after the frame was opened, not before.
     GateArmedLate,
@@ -132,11 +132,6 @@ impl Config {
     pub(crate) fn pairs_of(&self, unit: u8) -> u64 {
         let pairs = self.pairs.iter().enumerate();
         pairs.filter(|(_, ends)| ends.contains(&unit)).fold(0, |bits, (pair, _)| bits | 1 << pair)
-    }
-
-    /// The pair of `unit` with itself.
-    pub(crate) fn pair_within(&self, unit: u8) -> Option<u8> {
-        self.pairs.iter().position(|&ends| ends == [unit; 2]).map(|pair| pair as u8)
     }
 
     /// The distinct ends of a pair.

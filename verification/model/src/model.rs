@@ -6,7 +6,7 @@ use crate::config::{Bug, Config};
 use crate::state::{At, Rule, State};
 use crate::step::{Act, Step};
 use crate::waiting::Call;
-use crate::work::{Work, indices};
+use crate::work::Work;
 
 /// The protocol, in one configuration.
 #[derive(Clone, Debug)]
@@ -28,13 +28,11 @@ impl Protocol {
             At::Outside => may(Act::Join),
             At::Awake => self.awake(state, worker, &mut may),
             At::Entering(unit) => {
-                // Whether a unit asks about itself before or after it arrives is all one.
-                let itself = config.pair_within(unit).filter(|&pair| state.is_due(unit, pair));
-                itself.into_iter().for_each(|pair| self.tests(pair, &mut may));
-                may(Act::Go { carry: false });
-            }
-            At::Testing(_, left) => {
-                indices(left).for_each(|pair| self.tests(pair as u8, &mut may));
+                let mut due = state.due(config, unit).peekable();
+                if due.peek().is_none() {
+                    may(Act::Go { carry: false });
+                }
+                due.for_each(|pair| self.tests(pair, &mut may));
             }
             At::Arriving(_, left) => {
                 let pair = left.trailing_zeros();

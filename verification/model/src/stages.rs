@@ -22,13 +22,9 @@ impl Step<'_> {
             }
             self.emit(Work::Interact(pair));
         }
-        match self.at() {
-            At::Testing(unit, left) => self.goes_to(At::Testing(unit, left & !(1 << pair))),
-            At::Arriving(unit, left) => {
-                self.state.arrived &= !(1 << pair);
-                self.goes_to(At::Arriving(unit, left & !(1 << pair)));
-            }
-            _ => {}
+        if let At::Arriving(unit, left) = self.at() {
+            self.state.arrived &= !(1 << pair);
+            self.goes_to(At::Arriving(unit, left & !(1 << pair)));
         }
         self.leave_if_tested();
     }
@@ -41,7 +37,7 @@ impl Step<'_> {
     }
 
     fn leave_if_tested(&mut self) {
-        if let At::Testing(unit, 0) | At::Arriving(unit, 0) = self.at() {
+        if let At::Arriving(unit, 0) = self.at() {
             self.goes_to(At::AtGate(unit, Then::End));
         }
     }
@@ -169,16 +165,7 @@ impl Step<'_> {
         match self.at() {
             At::Entering(unit) => {
                 self.state.arrived |= 1 << unit;
-                let arrived = self.state.arrived;
-                let here =
-                    |pair: &u32| self.config.ends(*pair as u8).all(|end| arrived >> end & 1 == 1);
-                let within = self.config.pair_within(unit).map(u32::from);
-                let due =
-                    |pair: &u32| Some(*pair) != within || self.state.is_due(unit, *pair as u8);
-                let met = indices(self.config.pairs_of(unit)).filter(here).filter(due);
-                let met = met.fold(0, |bits, pair| bits | 1 << pair);
-                self.goes_to(At::Testing(unit, met));
-                self.leave_if_tested();
+                self.goes_to(At::AtGate(unit, Then::End));
             }
             At::Arriving(unit, left) => {
                 let first = left & left.wrapping_neg();

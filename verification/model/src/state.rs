@@ -52,12 +52,10 @@ pub enum At {
     Gone,
     /// Between two steps.
     Awake,
-    /// Begun to enter a unit.
+    /// Begun to enter a unit: it tests pairs, then arrives (`Spatial`).
     Entering(u8),
     /// Entering: pairs that are to be arrived at (`Pairwise`).
     Arriving(u8, u64),
-    /// Entering: pairs that are to be tested (`Spatial`).
-    Testing(u8, u64),
     /// About to leave the gate with this unit.
     AtGate(u8, Then),
     /// Leaves counts that it owes these pairs (a seeded bug only).
@@ -234,9 +232,14 @@ impl State {
         self.units[unit as usize].frame == self.display + 1
     }
 
-    /// Whether `pair` is still to be tested in the frame that `unit` enters.
-    pub(crate) fn is_due(&self, unit: u8, pair: u8) -> bool {
-        self.tests[pair as usize] == self.units[unit as usize].frame
+    /// Pairs that `unit`, which is entering, is to test before it arrives (`Spatial`): with itself and with
+    /// units that have arrived.
+    pub(crate) fn due<'s>(&'s self, config: &'s Config, unit: u8) -> impl Iterator<Item = u8> + 's {
+        let here = move |end| end == unit || self.arrived >> end & 1 == 1;
+        let frame = self.units[unit as usize].frame;
+        indices(config.pairs_of(unit))
+            .map(|pair| pair as u8)
+            .filter(move |&pair| self.tests[pair as usize] == frame && config.ends(pair).all(here))
     }
 
     /// Invariant 5: nobody else has a unit that is updated.
@@ -246,10 +249,9 @@ impl State {
             _ => 0,
         };
         let reads = |worker: &Worker| match worker.at {
-            At::Entering(unit) => 1 << unit,
-            At::Testing(_, pairs) => {
-                let ends = indices(pairs).flat_map(|pair| config.ends(pair as u8));
-                ends.fold(0, |bits, end| bits | 1_u64 << end)
+            At::Entering(unit) => {
+                let ends = self.due(config, unit).flat_map(|pair| config.ends(pair));
+                ends.fold(1_u64 << unit, |bits, end| bits | 1 << end)
             }
             At::Interacting(pair) => config.ends(pair).fold(0, |bits, end| bits | 1 << end),
             At::Rendering(unit) => 1 << unit,

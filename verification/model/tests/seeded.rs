@@ -14,7 +14,8 @@ fn breaks(bug: Bug, config: Config, expected: &str) {
     let is_failure =
         |name: &&'static str| found.model().property(name).expectation.discovery_is_failure();
     let mut broken: Vec<_> = discoveries.keys().copied().filter(is_failure).collect();
-    broken.sort_by_key(|name| discoveries[name].clone().into_actions().len());
+    let length = |name: &&'static str| discoveries[name].clone().into_actions().len();
+    broken.sort_by_key(|name| (length(name), *name));
     let states = found.unique_state_count();
     println!("\n{bug:?} breaks {broken:?} after {states} states:");
     let first = *broken.first().expect("the seeded bug was not noticed");
@@ -26,7 +27,12 @@ fn breaks(bug: Bug, config: Config, expected: &str) {
         }
     }
     println!("  and then:\n{last}");
-    assert_eq!(first, expected, "{bug:?}");
+    // Several may break in as few steps.
+    let firsts = broken.iter().take_while(|name| length(name) == length(&first));
+    assert!(
+        firsts.copied().any(|name| name == expected),
+        "{bug:?} breaks {broken:?}, not {expected}"
+    );
 }
 
 /// Two workers, three units in a row, two frames; nobody sleeps.

@@ -17,7 +17,7 @@ macro_rules! explored {
 
 explored! {
     ring: hand_over earlier_push_is_found two_producers one_slot_laps two_slot_laps two_consumers;
-    countdown: last_sees_all add_and_arm;
+    countdown: last_sees_all armed_again;
     arrivals: pairs_meet_once next_frame;
     inbox: one_letter two_senders this_frame_stays full_pool;
     latest: one_reader slots_are_reused two_readers reader_is_replaced readers_are_limited;

@@ -27,7 +27,6 @@ fn killer(fault: Fault) -> &'static str {
         DoubledToken => "token::never_doubled",
         TagNotChecked => "pipeline::sleeps_through_a_swap",
         LeavesWithCarry => "pipeline::spatial_after_update",
-        CandidatesEmptiedLate => "pipeline::spatial_after_update",
         GateArmedLate => "pipeline::solitary_unit",
         RendersArmedLate => "pipeline::two_holders_at_a_swap",
         TestedTwice => "pipeline::pairwise_after_update",

@@ -102,9 +102,6 @@ impl Counts for LoadStore {
         self.0.store(left.wrapping_sub(1), Ordering::Release);
         left == 1
     }
-    fn add(&self, arrivals: u32) {
-        self.0.fetch_add(arrivals, Ordering::AcqRel);
-    }
     fn arm(&self, arrivals: u32) {
         self.0.store(arrivals, Ordering::Release);
     }
@@ -136,9 +133,6 @@ impl Meets for Forgetful {
             (before != u32::MAX).then_some(before)
         })
         .collect()
-    }
-    fn clear(&self) {
-        self.newest.store(u32::MAX, Ordering::Release);
     }
 }
 

@@ -98,18 +98,18 @@ fn sort(n: u32, each: u32) -> u32 {
 fn bound(units: u32, did: Did, opens: Option<bool>) -> u32 {
     let find = if opens.is_some() { FIND_ALONE } else { FIND };
     let share = 2 + CARRIED * (1 + PUSH) + ANNOUNCE;
-    let gate = |opens| if opens { 9 + units * (1 + EMIT) } else { 2 };
+    let gate = |opens| if opens { 8 + units * (1 + EMIT) } else { 2 };
     // A solitary unit leaves the gate where others are passed on; there is none where one is alone.
     let pass_on = EMIT + if opens.is_none() { gate(true) } else { 0 };
     let work = match did.stage {
         Stage::BroadPhase => {
-            4 + 4 * (units - 1) + did.tests + did.found * (19 + EMIT) + gate(opens != Some(false))
+            4 + 4 * (units - 1) + did.tests + did.found * (17 + EMIT) + gate(opens != Some(false))
         }
         Stage::Interaction => 4 + 2 * did.pushes + 2 * (1 + EMIT),
         Stage::Update => {
             let candidates = sort(did.candidates, 13) + 6 * did.candidates;
             let letters = 2 + LETTERS * (5 + 3 + PUSH) + sort(LETTERS, 7);
-            7 + candidates + letters + did.posts * (6 + POP) + EMIT + pass_on
+            6 + candidates + letters + did.posts * (6 + POP) + EMIT + pass_on
         }
         // Under `Entry::AfterSwap` every unit is passed on.
         Stage::Render => 5 + (1 + EMIT) + if did.swaps { units * EMIT } else { 0 } + pass_on,
