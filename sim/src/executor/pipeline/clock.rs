@@ -58,9 +58,14 @@ impl<'t> StageClock<'t> {
 
     #[inline]
     fn turn_to(&mut self, doing: Doing) {
-        if self.doing == doing {
-            return;
+        if self.doing != doing {
+            self.change_to(doing);
         }
+    }
+
+    // Seldom called: most frames are not timed.
+    #[cold]
+    fn change_to(&mut self, doing: Doing) {
         let now = Instant::now();
         let began = std::mem::replace(&mut self.last, now);
         *match std::mem::replace(&mut self.doing, doing) {
