@@ -93,7 +93,8 @@ pub struct Post<'m, M> {
 
 impl<'m, M: Send + Sync> Post<'m, M> {
     /// A pool of as many letters as there are `slots`; `queue` holds the free ones and must have
-    /// [`crate::ring::slots_for`] of them.
+    /// [`crate::ring::slots_for`] of them. Letters that are left in `slots` from before are dropped when
+    /// their slots are used again.
     ///
     /// # Errors
     /// [`TableFull`] if `queue` is too short.
@@ -101,11 +102,7 @@ impl<'m, M: Send + Sync> Post<'m, M> {
         slots: &'m mut [LetterSlot<M>],
         queue: &'m mut [QueueSlot],
     ) -> Result<Self, TableFull> {
-        let free = IndexRing::new(queue)?;
-        for (index, slot) in slots.iter_mut().enumerate() {
-            *slot.message.get_mut() = None;
-            free.push(index as u32)?;
-        }
+        let free = IndexRing::holding(slots.len(), queue)?;
         Ok(Self { slots, free })
     }
 

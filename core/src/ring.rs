@@ -58,16 +58,29 @@ impl<'m> IndexRing<'m> {
     /// # Errors
     /// [`TableFull`] if `slots` is empty.
     pub fn new(slots: &'m mut [QueueSlot]) -> Result<Self, TableFull> {
-        let full = TableFull { table: Table::Queues, capacity: 0, needed: 1 };
-        let slot_bits = slots.len().checked_ilog2().ok_or(full)?;
-        let cells = slots.get(..1 << slot_bits).ok_or(full)?;
+        Self::holding(0, slots)
+    }
+
+    /// A ring over the largest power of two of `slots`, which holds the indices below `count`, the
+    /// least first.
+    ///
+    /// # Errors
+    /// [`TableFull`] if there are fewer slots than that, or none.
+    pub fn holding(count: usize, slots: &'m mut [QueueSlot]) -> Result<Self, TableFull> {
+        let slot_bits = slots.len().checked_ilog2().unwrap_or(0);
+        let capacity = if slots.is_empty() { 0 } else { 1 << slot_bits };
+        let needed = count.max(1);
+        let full = TableFull { table: Table::Queues, capacity, needed };
+        let cells = slots.get(..capacity).filter(|_| needed <= capacity).ok_or(full)?;
         // Laps are counted from 1: a cell of lap 0 is free for lap 1.
-        cells.iter().for_each(|cell| cell.0.store(0, site::EXCLUSIVE));
         let first = 1 << slot_bits;
+        for (index, cell) in cells.iter().enumerate() {
+            cell.0.store(if index < count { first | index } else { 0 }, site::EXCLUSIVE);
+        }
         Ok(Self {
             cells,
             head: CachePadded::new(AtomicWord::new(first)),
-            tail: CachePadded::new(AtomicWord::new(first)),
+            tail: CachePadded::new(AtomicWord::new(first + count)),
             slot_bits,
         })
     }
@@ -184,6 +197,27 @@ mod tests {
         assert_eq!((ring.pop(), ring.pop()), (Some(3), None));
         assert_eq!(IndexRing::new(&mut []).map(drop), Err(full(0, 1)));
     }
+
+    #[test]
+    fn a_ring_that_holds_indices_from_the_start() {
+        let mut slots = [const { QueueSlot::new() }; 4];
+        for count in 0..=4 {
+            let ring =
+                IndexRing::holding(count, &mut slots).unwrap_or_else(|full| panic!("{full}"));
+            assert_eq!(ring.looks_empty(), count == 0);
+            for _lap in 0..3 {
+                for index in 0..count as u32 {
+                    assert_eq!(ring.pop(), Some(index), "of {count}");
+                    assert_eq!(ring.push(index), Ok(()));
+                }
+            }
+            (0..count).for_each(|_| assert!(ring.pop().is_some()));
+            assert_eq!((ring.pop(), ring.looks_empty()), (None, true));
+        }
+        assert_eq!(IndexRing::holding(5, &mut slots).map(drop), Err(full(4, 5)));
+        assert_eq!(IndexRing::holding(5, &mut slots[..3]).map(drop), Err(full(2, 5)));
+    }
+
     /// Invariant 7: the cell is written, its pusher sleeps before it moves the tail.
     #[test]
     fn a_pusher_that_is_suspended_stops_nobody() {
