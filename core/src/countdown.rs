@@ -4,8 +4,8 @@ use crate::sync::{Atomic, const_fn, site};
 
 /// Counts arrivals down; the last arriver owns what comes next.
 ///
-/// The paper's three counters are all this (§5.4): a unit's pending work in a frame, a modelled
-/// interaction's two ends, a frame's renders.
+/// The paper's three counters are all this (§5.4): a unit's pending work in a frame (in `pending.rs`, with
+/// the list of that work in the same word), a modelled interaction's two ends, a frame's renders.
 ///
 /// ```
 /// use dualframe_core::countdown::Countdown;

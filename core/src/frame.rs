@@ -47,7 +47,7 @@ pub enum Entry {
     AfterSwap,
 }
 
-/// The frame-wide countdowns, and how far frames have come.
+/// How far frames have come.
 #[derive(Debug)]
 pub(crate) struct Window {
     /// Units not yet rendered in the frame on display.

@@ -17,8 +17,9 @@ const EMPTY: usize = (1 << INDEX_BITS) - 1;
 pub(crate) struct Pending(AtomicWord);
 
 impl Pending {
-    /// The most interactions that there may be to choose from: 65,535 where a word has 32 bits.
-    pub(crate) const MOST_INTERACTIONS: usize = EMPTY;
+    /// The most interactions that there may be, 65,533 where a word has 32 bits: one unit may have them all,
+    /// and waits for two things more.
+    pub(crate) const MOST_INTERACTIONS: usize = EMPTY - 2;
 
     const_fn! {
         /// A countdown that ends at its `arrivals`-th arrival, and no candidates.
@@ -110,9 +111,10 @@ mod tests {
     #[test]
     fn the_greatest_index_and_the_most_candidates() {
         let pending = Pending::new(2);
-        let last = InteractionId((Pending::MOST_INTERACTIONS - 1) as u32);
-        pending.push(last, last.0, |next| assert_eq!(next, NONE));
-        assert_eq!(pending.first(), last.0);
-        assert!(!pending.arrive());
+        let most = Pending::MOST_INTERACTIONS as u32;
+        pending.push(InteractionId(most - 1), most, |next| assert_eq!(next, NONE));
+        assert_eq!(pending.first(), most - 1);
+        let count = pending.0.load(site::EXCLUSIVE) >> INDEX_BITS;
+        assert_eq!(count, Pending::MOST_INTERACTIONS + 2);
     }
 }

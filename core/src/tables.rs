@@ -83,8 +83,8 @@ pub(crate) struct Queues<'m> {
     pub(crate) render: [IndexRing<'m>; 2],
 }
 
-/// The frame being gathered. Whoever enters it writes to all of this: it is in one cache line, that
-/// one worker after the other fetches once.
+/// The frame being gathered. Whoever enters it writes to what is counted here: it is in one cache line,
+/// which one worker after the other fetches once.
 #[derive(Debug)]
 pub(crate) struct Gathering<'m> {
     /// Units that have entered it.

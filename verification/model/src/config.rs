@@ -34,7 +34,7 @@ pub enum Bug {
     /// A unit's update does not wait for the others' entries.
     NoGate,
     /// A frame's arrivals still count when the next one's first units enter.
-    ArrivalsClearedLate,
+    ArrivalsKept,
     /// The gate is armed again after the frame was opened, not before.
     GateArmedLate,
     /// The last but one swaps.

@@ -211,9 +211,7 @@ impl Step<'_> {
             self.then(then);
             return;
         }
-        if !self.config.has(Bug::ArrivalsClearedLate)
-            && self.config.broad_phase == BroadPhase::Spatial
-        {
+        if !self.config.has(Bug::ArrivalsKept) && self.config.broad_phase == BroadPhase::Spatial {
             self.state.arrived = 0;
         }
         if !self.config.has(Bug::GateArmedLate) {
@@ -228,7 +226,7 @@ impl Step<'_> {
             self.goes_to(At::Opening(unit + 1, then));
             return;
         }
-        if self.config.has(Bug::ArrivalsClearedLate) {
+        if self.config.has(Bug::ArrivalsKept) {
             self.state.arrived = 0;
         }
         if self.config.has(Bug::GateArmedLate) {

@@ -59,7 +59,7 @@ seeded! {
     render_not_counted: RenderNotCounted in awake() => property::of(Rule::Order);
     counted_after_gate: CountedAfterGate in awake() => property::ACCESS;
     no_gate: NoGate in awake() => property::ACCESS;
-    arrivals_cleared_late: ArrivalsClearedLate in awake() => property::of(Rule::Order);
+    arrivals_kept: ArrivalsKept in awake() => property::of(Rule::Order);
     gate_armed_late: GateArmedLate in awake() => property::PROGRESS;
     swap_by_last_but_one: SwapByLastButOne in awake() => property::of(Rule::Swap);
     displayed_before_swap: DisplayedBeforeSwap in Config { tokens: 2, ..awake() }

@@ -19,21 +19,23 @@ pub(super) struct Team {
 /// Threads that are Rayon's, asleep between two runs; of it only the lending of borrowed work to threads
 /// that last is used here. None outlives this.
 struct Hired {
-    /// There until this is dropped.
+    /// There until this is dropped, once all threads have started.
     pool: Option<ThreadPool>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Hired {
     fn new(count: usize) -> Result<Self, ExecutorError> {
-        let mut threads = Vec::with_capacity(count);
+        // If not all start, those that did have ended when the error is returned.
+        let mut hired = Self { pool: None, threads: Vec::with_capacity(count) };
         let start = |worker: ThreadBuilder| {
             let name = format!("worker {}", worker.index() + 1);
-            threads.push(thread::Builder::new().name(name).spawn(|| worker.run())?);
+            hired.threads.push(thread::Builder::new().name(name).spawn(|| worker.run())?);
             Ok(())
         };
-        let pool = ThreadPoolBuilder::new().num_threads(count).spawn_handler(start).build()?;
-        Ok(Self { pool: Some(pool), threads })
+        hired.pool =
+            Some(ThreadPoolBuilder::new().num_threads(count).spawn_handler(start).build()?);
+        Ok(hired)
     }
 }
 
