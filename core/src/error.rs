@@ -44,8 +44,9 @@ pub struct TableFull {
     pub table: Table,
     /// What it holds.
     pub capacity: usize,
-    /// What it would have had to hold for all that was asked of it so far in this frame; the last
-    /// such error of a frame names the capacity needed.
+    /// What it would have had to hold for all that was asked of it so far in this frame. The last such error
+    /// of a frame names the capacity needed, or less where smaller requests, of contacts, still found room
+    /// after it.
     pub needed: usize,
 }
 

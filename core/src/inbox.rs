@@ -72,19 +72,17 @@ pub struct Inbox(Atomic);
 impl Inbox {
     const_fn! {
         /// An empty inbox.
-        pub const fn new() -> Self {
+        ///
+        /// # Safety
+        /// It stays with one [`Post`]: another pool's letters have the same numbers, and would be taken for
+        /// those that are in it.
+        pub const unsafe fn new() -> Self {
             Self(Atomic::new(NONE))
         }
     }
 }
 
-impl Default for Inbox {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-/// The pool of letters that a pipeline's inboxes share. An inbox stays with one pool.
+/// The pool of letters that a pipeline's inboxes share.
 #[derive(Debug)]
 pub struct Post<'m, M> {
     slots: &'m [LetterSlot<M>],
@@ -139,7 +137,7 @@ impl<'m, M: Send + Sync> Post<'m, M> {
     }
 
     fn put(inbox: &Inbox, index: u32, slot: &LetterSlot<M>) {
-        let mut newest = inbox.0.load(site::LIST_FOLLOW);
+        let mut newest = inbox.0.load(site::MAIL_LOOK);
         loop {
             slot.next.store(newest, site::LIST_LINK);
             match inbox.0.exchange(newest, index, site::MAIL_PUSH) {
@@ -153,7 +151,7 @@ impl<'m, M: Send + Sync> Post<'m, M> {
     /// The letters to process in `frame`: those posted before it, in order. One reader an inbox.
     pub fn collect(&self, inbox: &Inbox, frame: Frame) -> Mail<'_, 'm, M> {
         // An empty inbox stays untouched: most are, in most frames.
-        if inbox.0.load(site::LIST_FOLLOW) == NONE {
+        if inbox.0.load(site::MAIL_LOOK) == NONE {
             return Mail { post: self, next: NONE };
         }
         let mut rest = inbox.0.swap(NONE, site::MAIL_TAKE);
@@ -226,7 +224,8 @@ mod tests {
         let mut slots = [const { LetterSlot::new() }; 6];
         let mut queue = [const { QueueSlot::new() }; 8];
         let post = Post::new(&mut slots, &mut queue).unwrap_or_else(|full| panic!("{full}"));
-        let inbox = Inbox::new();
+        // SAFETY: there is one pool.
+        let inbox = unsafe { Inbox::new() };
         let from = |sender, sequence| From { sender, sequence };
         let ranks = [from(2, 0), from(0, 1), from(1, 1), from(1, 0), from(0, 2)];
         // Twice: those that are not read leave room for others.

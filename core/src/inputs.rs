@@ -1,5 +1,8 @@
 //! What an update reads: the unit's letters and its interactions' results, in fixed orders.
 
+use ::core::cell;
+use ::core::marker::PhantomData;
+
 use crate::contacts::Segments;
 use crate::environment::Environment;
 use crate::frame::Frame;
@@ -9,7 +12,15 @@ use crate::sync::site;
 use crate::tables::Tables;
 use crate::unit::{InteractionId, NONE, UnitId};
 
-/// One unit's inputs to one update.
+/// One unit's inputs to one update: for the thread that updates it.
+///
+/// ```compile_fail,E0277
+/// use dualframe_core::{environment::Environment, inputs::Inputs};
+/// fn shared<T: Sync>(_: &T) {}
+/// fn update<E: Environment>(inputs: &Inputs<E>) {
+///     shared(inputs);
+/// }
+/// ```
 pub struct Inputs<'t, 'm, E: Environment + ?Sized> {
     tables: &'t Tables<'m, E>,
     unit: UnitId,
@@ -17,6 +28,8 @@ pub struct Inputs<'t, 'm, E: Environment + ?Sized> {
     mail: Mail<'t, 'm, E::Message>,
     /// Letters posted so far by this update.
     posted: u32,
+    /// Not `Sync`: interactions are sorted by whoever asks for them.
+    one_thread: PhantomData<cell::Cell<()>>,
 }
 
 /// An interaction that the unit took part in this frame.
@@ -35,7 +48,7 @@ pub struct Interacted<'t, 'm, I, C> {
 impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
     pub(crate) fn new(tables: &'t Tables<'m, E>, unit: UnitId, frame: Frame) -> Self {
         let mail = tables.post.collect(&tables.unit(unit).inbox, frame);
-        Self { tables, unit, frame, mail, posted: 0 }
+        Self { tables, unit, frame, mail, posted: 0, one_thread: PhantomData }
     }
 
     /// The unit's interactions of this frame that passed the broad phase, in pair order: by the

@@ -129,7 +129,7 @@ impl<'c, T: Copy + Send + Sync, const SLOTS: usize> Readers<'c, T, SLOTS> {
     pub fn reader(&self) -> Result<Reader<'c, T, SLOTS>, TableFull> {
         let capacity = SLOTS - 2;
         let readers = &self.cell.readers;
-        let mut count = readers.load(site::EXCLUSIVE);
+        let mut count = readers.load(site::COUNT_LOOK);
         loop {
             // A refused claim leaves no trace: counting it and taking it back would meanwhile
             // refuse others who have room.

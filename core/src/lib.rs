@@ -8,8 +8,9 @@
 //! allocate, built with overflow checks off, as releases are). One [`worker::Worker::step`] does at
 //! most one work unit: its own cost is a bounded number of atomic operations (`PROTOCOL.md` §8), except
 //! that a compare-and-swap is retried when another worker succeeded at the same word meanwhile. A worker
-//! that is suspended anywhere holds back only the work unit in its hand. A full table is a returned
-//! error that names the capacity needed. Waiting is the host's ([`wait::Waiting`]).
+//! that is suspended anywhere holds back only the work unit in its hand and what it carries (64 others at
+//! most); every queue stays usable. A full table is a returned error that names the capacity needed. Waiting
+//! is the host's ([`wait::Waiting`]).
 //!
 //! # One idea
 //!
@@ -35,6 +36,9 @@
 //! | Table 1 | [`probe`] |
 #![cfg_attr(not(loom), no_std)]
 #![deny(clippy::unwrap_used, clippy::expect_used)]
+
+#[cfg(target_pointer_width = "16")]
+compile_error!("units and slots are numbered by 32 bits, and an index has to hold their numbers");
 
 #[cfg(all(test, not(loom)))]
 extern crate std;

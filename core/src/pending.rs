@@ -41,7 +41,7 @@ impl Pending {
     /// already. `link` is told what is to follow the chain's last one; more than once where others push.
     #[inline]
     pub(crate) fn push(&self, first: InteractionId, count: u32, link: impl Fn(u32)) {
-        let mut seen = self.0.load(site::CANDIDATE_HEAD);
+        let mut seen = self.0.load(site::CANDIDATE_LOOK);
         loop {
             link(index_of(seen));
             let pushed = word((seen >> INDEX_BITS) + count as usize, first.index());

@@ -8,10 +8,10 @@ use crate::inbox::{From, Rejected};
 use crate::probe::NoProbe;
 use crate::stage::{Stage, Stages};
 use crate::storage::Memory;
-use crate::sync::{seeded, site};
+use crate::sync::site;
 use crate::tables::{Home, Tables};
 use crate::token::{Token, TokenOffice};
-use crate::unit::{InteractionId, UnitId, Work};
+use crate::unit::{UnitId, Work};
 use crate::wait::{Bells, Spin, Waiting};
 use crate::worker::Worker;
 
@@ -170,7 +170,8 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         })
     }
 
-    /// The largest number of candidates and of contacts that one of the last two frames used.
+    /// The largest number of candidates and of contacts that a frame in flight has used so far; at rest,
+    /// those of the last frame.
     pub fn high_water(&mut self) -> (usize, usize) {
         let both = [Frame(0), Frame(1)];
         let candidates = both.map(|frame| self.tables.candidates_used(frame));
@@ -198,38 +199,6 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     pub(crate) fn render_visible(&self) -> bool {
         let display = self.window.display();
         !self.tables.queues.render[display.parity()].looks_empty()
-    }
-
-    /// A work unit of `stage` that is queued at a home or for everybody.
-    #[inline]
-    pub(crate) fn pop(&self, home: &Home<'_>, stage: Stage) -> Option<Work> {
-        let interact = &self.tables.queues.interact;
-        match stage {
-            Stage::BroadPhase => home.enter.pop().map(|unit| Work::Enter(UnitId(unit))),
-            Stage::Interaction => interact.pop().map(|id| Work::Interact(InteractionId(id))),
-            Stage::Update => home.update.pop().map(|unit| Work::Update(UnitId(unit))),
-            Stage::Render => self.pop_render(),
-        }
-    }
-
-    /// An update that is queued at the home of this number.
-    #[inline]
-    pub(crate) fn pop_update(&self, home: u32) -> Option<Work> {
-        let home = self.tables.queues.homes.at(home);
-        if home.update.looks_empty() { None } else { self.pop(home, Stage::Update) }
-    }
-
-    /// A unit of the frame on display. Another holder may have swapped since `display` was read,
-    /// and the queue may then hold units of a frame that may not be rendered yet: those go back.
-    pub(crate) fn pop_render(&self) -> Option<Work> {
-        let display = self.window.display();
-        let queue = &self.tables.queues.render[display.parity()];
-        let unit = UnitId(queue.pop()?);
-        if self.rendered_frame(unit) == display || seeded!(TagNotChecked) {
-            return Some(Work::Render(unit));
-        }
-        self.push(Work::Render(unit));
-        None
     }
 
     /// Queues `work`.

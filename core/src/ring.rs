@@ -38,9 +38,8 @@ pub const fn slots_for(indices: usize) -> usize {
 
 /// The queue. It borrows its slots, so the algorithm stands apart from the storage.
 ///
-/// On a 64-bit target the cycle wraps after 2^64 / slots pushes; on a 32-bit one after
-/// 2^32 / slots laps of the ring, so keep rings there below about 2^12 slots: then a thread
-/// would have to sleep through a million laps, to the lap, to be mistaken.
+/// Positions wrap after as many pushes as a word counts: 2^64, or 2^32 on a 32-bit target. To mistake one for
+/// another, a thread would have to sleep, within one operation, through a multiple of that many.
 #[derive(Debug)]
 pub struct IndexRing<'m> {
     cells: &'m [QueueSlot],

@@ -41,7 +41,8 @@ impl<O> UnitSlot<O> {
                 frame: Atomic::new(0),
                 home: Atomic::new(0),
                 modelled: Atomic::new(NONE),
-                inbox: Inbox::new(),
+                // SAFETY: a pipeline gives the unit another, which stays with the pipeline's letters.
+                inbox: unsafe { Inbox::new() },
                 solitary: false,
                 bypasses: false,
                 object: Cell::new(object),

@@ -22,6 +22,12 @@ macro_rules! const_fn {
         #[cfg(loom)]
         $(#[$meta])* $vis fn $($rest)*
     };
+    ($(#[$meta:meta])* $vis:vis const unsafe fn $($rest:tt)*) => {
+        #[cfg(not(loom))]
+        $(#[$meta])* $vis const unsafe fn $($rest)*
+        #[cfg(loom)]
+        $(#[$meta])* $vis unsafe fn $($rest)*
+    };
 }
 pub(crate) use const_fn;
 
@@ -146,16 +152,19 @@ sites! {
     /// Acquire: pairs with `ARRIVALS_PUBLISH`.
     ARRIVALS_READ = Acquire;
     /// Relaxed: lists of candidates and letters are walked only by the unit's updater, after
-    /// its countdown ended.
+    /// its countdown ended; those of modelled interactions do not change while workers run.
     LIST_LINK = Relaxed;
     /// Relaxed: see `LIST_LINK`.
     LIST_FOLLOW = Relaxed;
+    /// Relaxed: re-validated by the CAS that follows.
+    CANDIDATE_LOOK = Relaxed;
     /// Relaxed: the count cannot reach zero meanwhile, and whoever could take it there, to walk the list,
     /// is ordered after this by the hold that keeps it up.
     CANDIDATE_PUSH = Relaxed;
-    /// Relaxed: re-validated by the CAS that follows, or exclusive to the updater.
+    /// Relaxed: exclusive to the updater.
     CANDIDATE_HEAD = Relaxed;
-    /// Relaxed: what an interaction slot says of its pair is published by the queue or the gate.
+    /// Relaxed: what an interaction slot says of its pair is published by the queue or the gate, what a
+    /// letter says by its push; what a latest-value cell notes of a slot is its writer's own.
     SLOT_FIELD = Relaxed;
     /// Relaxed: a unit's frame tag changes only in its update and travels with the unit.
     FRAME_TAG = Relaxed;
@@ -163,6 +172,9 @@ sites! {
     POOL_CLAIM = Relaxed;
     /// Relaxed: a pool is reset at a gate, between its last reader and its next claimer.
     POOL_RESET = Relaxed;
+    /// Relaxed: re-validated by the CAS that follows; and what an update is to read was posted before all
+    /// that it is ordered after, so that it does not take its inbox for empty.
+    MAIL_LOOK = Relaxed;
     /// Release: publishes the letter to the receiving unit's updater, also from outside.
     MAIL_PUSH = Release;
     /// Acquire: pairs with `MAIL_PUSH`.
@@ -197,6 +209,8 @@ sites! {
     /// Sequentially consistent fence between ceasing to be a sleeper and looking at what is left
     /// behind.
     FENCE_LEAVE = SeqCst;
+    /// Relaxed: how many tokens or readers are left; re-validated by the CAS that follows.
+    COUNT_LOOK = Relaxed;
     /// Acquire and Release: the token's renderer moves from holder to holder.
     TOKEN_COUNT = AcqRel;
     /// Acquire and Release: a new reader enters after the one whose place it takes has left, so

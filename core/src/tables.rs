@@ -8,7 +8,7 @@ use crate::countdown::Countdown;
 use crate::environment::Environment;
 use crate::error::{SetupError, Table, TableFull};
 use crate::frame::Frame;
-use crate::inbox::{From, Post, Rejected};
+use crate::inbox::{From, Inbox, Post, Rejected};
 use crate::list;
 use crate::pending::Pending;
 use crate::ring::{IndexRing, QueueSlot, slots_for};
@@ -136,7 +136,8 @@ impl<'m, E: Environment> Tables<'m, E> {
         for unit in units.iter_mut() {
             unit.frame.store(0, site::EXCLUSIVE);
             unit.modelled.store(NONE, site::EXCLUSIVE);
-            unit.inbox = crate::inbox::Inbox::new();
+            // SAFETY: nobody but this pipeline reaches it, until the next one gives the unit another.
+            unit.inbox = unsafe { Inbox::new() };
             // No rendering precedes the first update: it waits for the frame's opening only.
             unit.pending.arm(1);
             unit.bypasses = unit.solitary;

@@ -55,7 +55,7 @@ impl TokenOffice {
 
     /// A token for `renderer`, or `renderer` back if all are out.
     pub(crate) fn issue<R>(&self, renderer: R) -> Result<Token<'_, R>, R> {
-        let mut left = self.left.load(site::EXCLUSIVE);
+        let mut left = self.left.load(site::COUNT_LOOK);
         while left > 0 {
             match self.left.exchange(left, left - 1, site::TOKEN_COUNT) {
                 Err(found) if !seeded!(DoubledToken) => left = found,

@@ -9,6 +9,7 @@ use crate::pipeline::Pipeline;
 use crate::probe::{NoProbe, Probe};
 use crate::stage::{Stage, Stages};
 use crate::sync::{fence, seeded, site};
+use crate::tables::Home;
 use crate::token::Token;
 use crate::unit::{InteractionId, UnitId, Work};
 use crate::wait::{Spin, Waiting};
@@ -26,7 +27,7 @@ pub enum Step {
 pub(crate) trait Outputs {
     /// `work` can be done now, by this worker too.
     fn emit(&mut self, work: Work);
-    /// `work` can be done now, but not by this worker.
+    /// `work` is for whoever comes for it first: this worker cannot do it now, or is not to keep it.
     fn queue(&mut self, work: Work);
     /// Work that was queued already can be done now, by holders.
     fn renders_visible(&mut self);
@@ -113,9 +114,43 @@ impl<E: Environment, W: Waiting> Carry<'_, '_, E, W> {
         let other = match self.works.last() {
             Some(Work::Update(_)) | None if before_updates => None,
             Some(_) => self.works.pop(),
-            None => self.pipeline.pop_update(self.home),
+            None => self.pop_update(),
         };
         other.or_else(|| self.interactions.pop_front().map(Work::Interact))
+    }
+
+    /// An update that is queued at this worker's home.
+    #[inline]
+    fn pop_update(&mut self) -> Option<Work> {
+        let home = self.pipeline.tables.queues.homes.at(self.home);
+        if home.update.looks_empty() { None } else { self.pop(home, Stage::Update) }
+    }
+
+    /// A work unit of `stage` that is queued at a home or for everybody.
+    #[inline]
+    fn pop(&mut self, home: &Home<'_>, stage: Stage) -> Option<Work> {
+        let interact = &self.pipeline.tables.queues.interact;
+        match stage {
+            Stage::BroadPhase => home.enter.pop().map(|unit| Work::Enter(UnitId(unit))),
+            Stage::Interaction => interact.pop().map(|id| Work::Interact(InteractionId(id))),
+            Stage::Update => home.update.pop().map(|unit| Work::Update(UnitId(unit))),
+            Stage::Render => self.pop_render(),
+        }
+    }
+
+    /// A unit of the frame on display. Another holder may have swapped since `display` was read, and the
+    /// queue may then hold units of a frame that may not be rendered yet: those go back, and who has
+    /// looked for them in vain meanwhile is called.
+    fn pop_render(&mut self) -> Option<Work> {
+        let display = self.pipeline.window.display();
+        let queue = &self.pipeline.tables.queues.render[display.parity()];
+        let unit = UnitId(queue.pop()?);
+        let work = Work::Render(unit);
+        if self.pipeline.rendered_frame(unit) == display || seeded!(TagNotChecked) {
+            return Some(work);
+        }
+        self.queue(work);
+        None
     }
 
     /// Whether `unit` is another home's, whose worker is to have it if it comes for it in time.
@@ -219,9 +254,10 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         Self { carry, stage: Stage::BroadPhase, token: None, probe }
     }
 
-    /// A worker like this one, new, watched by `probe`.
+    /// This worker, watched by `probe` from now on.
     pub fn probed<Q: Probe>(self, probe: Q) -> Worker<'p, 'm, E, W, Q> {
-        Worker::new(self.carry.pipeline, self.carry.home, probe)
+        let Self { carry, stage, token, .. } = self;
+        Worker { carry, stage, token, probe }
     }
 
     /// Gives this worker the right to render, and its renderer.
@@ -243,9 +279,9 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         self.token.take()
     }
 
-    /// The token, to reach the renderer between two steps.
-    pub fn token(&mut self) -> Option<&mut Token<'p, E::Renderer>> {
-        self.token.as_mut()
+    /// The renderer of the token that this worker holds, to reach it between two steps.
+    pub fn renderer(&mut self) -> Option<&mut E::Renderer> {
+        self.token.as_mut().map(Token::renderer)
     }
 
     /// The probe.
@@ -262,6 +298,8 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
     pub fn step(&mut self, env: &E) -> Result<Step, E::Error> {
         let Some(work) = self.next_work() else {
             self.carry.set_hungry(true);
+            // A rendering may have been put back.
+            self.carry.announce();
             return Ok(Step::Idle);
         };
         self.carry.set_hungry(false);
@@ -298,7 +336,7 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
             && !seeded!(CarriedBeforeRendering)
             && !matches!(self.carry.works.last(), Some(Work::Render(_)))
             && pipeline.render_visible()
-            && let Some(work) = pipeline.pop_render()
+            && let Some(work) = self.carry.pop_render()
         {
             return Some(work);
         }
@@ -312,7 +350,7 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
                 let Some(stage) = migrate(self.stage, pipeline.visible(home, holder)) else {
                     break;
                 };
-                if let Some(work) = pipeline.pop(home, stage) {
+                if let Some(work) = self.carry.pop(home, stage) {
                     return Some(work);
                 }
             }

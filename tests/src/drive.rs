@@ -225,7 +225,7 @@ impl<'p, 'c> Shop<'p, 'c> {
     /// Whether a worker may leave for good: not with the token in hand, nor while one lies about
     /// that this thread may have put there, for those who sleep would not notice it.
     fn may_go(&self, worker: &mut Hand<'p, '_, 'c>) -> bool {
-        worker.token().is_none() && self.tokens.lock().expect("no poison").is_empty()
+        worker.renderer().is_none() && self.tokens.lock().expect("no poison").is_empty()
     }
 
     /// One thread, from joining to leaving. The first one never leaves, so that there is one.
@@ -256,7 +256,7 @@ impl<'p, 'c> Shop<'p, 'c> {
             }
             if dice.one_in(24) {
                 // Half of the time with the token in hand: then that is gone too.
-                let holding = worker.token().map(|token| token.renderer().token);
+                let holding = worker.renderer().map(|screen| screen.token);
                 drop(worker);
                 if dice.one_in(4) {
                     std::thread::yield_now();
@@ -269,7 +269,7 @@ impl<'p, 'c> Shop<'p, 'c> {
             }
             let idle = step == Ok(Step::Idle);
             if (idle || dice.one_in(6))
-                && worker.token().is_none()
+                && worker.renderer().is_none()
                 && let Some(token) = self.tokens.lock().expect("no poison").pop()
             {
                 worker.hold(token).map_err(drop).expect("this pipeline's token");

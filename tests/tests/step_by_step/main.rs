@@ -8,6 +8,7 @@ use std::sync::Barrier;
 
 use dualframe_core::frame::Frame;
 use dualframe_core::inbox::From;
+use dualframe_core::probe::NoProbe;
 use dualframe_core::unit::{InteractionId, UnitId, Work};
 use dualframe_core::worker::Step;
 use dualframe_tests::watchdog;
@@ -181,10 +182,12 @@ fn a_token_goes_from_hand_to_hand() {
         let (mut a, mut b) = (pipeline.worker(), pipeline.worker());
         hold(&pipeline, &mut a);
         assert_eq!([a.step(&FAR), a.step(&FAR)], [ENTERED, UPDATED]);
-        assert!(a.token().is_some() && b.token().is_none());
+        assert!(a.renderer().is_some() && b.renderer().is_none());
         let token = a.release().expect("it has one");
-        assert!(a.token().is_none() && b.hold(token).is_ok());
+        assert!(a.renderer().is_none() && b.hold(token).is_ok());
         assert_eq!(a.step(&FAR), IDLE);
+        let mut b = b.probed(NoProbe);
+        assert!(b.renderer().is_some(), "who is watched keeps the token");
         assert_eq!(b.step(&FAR), RENDERED, "what the other one carried");
     });
 }
@@ -287,9 +290,9 @@ fn high_water_is_what_one_frame_used() {
         pipeline.run(3).expect("at rest");
         finish(&pipeline, &NEAR);
         assert_eq!(pipeline.high_water(), (6, 12));
-        pipeline.run(2).expect("at rest");
+        pipeline.run(1).expect("at rest");
         finish(&pipeline, &FAR);
-        assert_eq!(pipeline.high_water(), (0, 0), "of the last two frames");
+        assert_eq!(pipeline.high_water(), (0, 0), "of the last frame");
     });
 }
 

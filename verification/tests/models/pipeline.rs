@@ -155,7 +155,7 @@ fn two_workers(
         let did = [parts[0].0, parts[1].0];
         let mut left: Vec<_> = parts.into_iter().filter_map(|(_, worker)| worker).collect();
         let mut last = left.remove(0);
-        if last.worker().token().is_none() {
+        if last.worker().renderer().is_none() {
             last.hold(pipeline, screen);
         }
         (did, overlap(&last.finish(pipeline, world)))
