@@ -49,6 +49,7 @@ extern crate std;
 struct Readme;
 
 pub mod arrivals;
+mod carry;
 pub mod contacts;
 pub mod countdown;
 pub mod environment;

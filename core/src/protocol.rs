@@ -5,6 +5,7 @@
 
 use heapless::Vec;
 
+use crate::carry::Outputs;
 use crate::contacts::Contacts;
 use crate::environment::{Environment, Pair};
 use crate::error::TableFull;
@@ -16,7 +17,6 @@ use crate::sync::{seeded, site};
 use crate::token::Token;
 use crate::unit::{InteractionId, NONE, UnitId, Work};
 use crate::wait::Waiting;
-use crate::worker::Outputs;
 
 /// Pairs that are counted and given room together, so that what workers write in common is written
 /// once for many. Usually 32: more than one block has neighbours.

@@ -1,0 +1,348 @@
+//! What a worker carries (§4.2): what its work units set free, as long as nobody is hungry; and what of the
+//! queues it takes next.
+
+use heapless::{Deque, Vec};
+
+use crate::environment::Environment;
+use crate::pipeline::Pipeline;
+use crate::stage::{Stage, Stages};
+use crate::sync::{fence, seeded, site};
+use crate::tables::Home;
+use crate::unit::{InteractionId, UnitId, Work};
+use crate::wait::Waiting;
+
+/// Takes what a work unit sets free.
+pub(crate) trait Outputs {
+    /// `work` can be done now, by this worker too.
+    fn emit(&mut self, work: Work);
+    /// `work` is for whoever comes for it first: this worker cannot do it now, or is not to keep it.
+    fn queue(&mut self, work: Work);
+    /// Work that was queued already can be done now, by holders.
+    fn renders_visible(&mut self);
+    /// The pipeline is at rest.
+    fn all_done(&mut self);
+}
+
+/// Interactions, and other work units, that a worker may carry at once: more than one block has neighbours,
+/// so that a unit's interactions need no queue. Usually 32; beyond it they are queued.
+#[cfg(not(loom))]
+const MOST_CARRIED: usize = 32;
+/// Nobody else sees what is carried: what is queued is what models are about.
+#[cfg(loom)]
+const MOST_CARRIED: usize = 1;
+
+/// Interactions of the frame being gathered that a worker keeps while it can update: what it does when
+/// nothing is left but updates that others are at, for which the frame's opening waits. Usually 16, about
+/// an update's time.
+const RESERVE: usize = MOST_CARRIED / 2;
+
+/// Carry-over (§4.2): outputs are carried as long as nobody is hungry; and how many sleepers what was
+/// queued is to wake.
+pub(crate) struct Carry<'p, 'm, E: Environment, W: Waiting> {
+    pub(crate) pipeline: &'p Pipeline<'m, E, W>,
+    /// Interactions, oldest first.
+    interactions: Deque<InteractionId, MOST_CARRIED>,
+    /// All else, newest first.
+    works: Vec<Work, MOST_CARRIED>,
+    queued: u32,
+    renders: u32,
+    /// Whether this worker is counted among the hungry.
+    hungry: bool,
+    pub(crate) home: u32,
+}
+
+impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
+    /// Nothing, in the hands of a worker of home `home`.
+    pub(crate) fn new(pipeline: &'p Pipeline<'m, E, W>, home: u32) -> Self {
+        Self {
+            pipeline,
+            interactions: Deque::new(),
+            works: Vec::new(),
+            queued: 0,
+            renders: 0,
+            hungry: false,
+            home,
+        }
+    }
+
+    #[inline]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.works.is_empty() && self.interactions.is_empty()
+    }
+
+    /// Whether a rendering is carried: on top, then, for only holders can do it.
+    pub(crate) fn has_rendering(&self) -> bool {
+        matches!(self.works.last(), Some(Work::Render(_)))
+    }
+
+    /// Gives what is carried to whoever comes first.
+    fn shed(&mut self) {
+        while let Some(id) = self.interactions.pop_front() {
+            self.queue(Work::Interact(id));
+        }
+        while let Some(work) = self.works.pop() {
+            self.queue(work);
+        }
+    }
+
+    /// Gives what is carried to those who found nothing to do, if there are any.
+    #[inline]
+    pub(crate) fn share(&mut self) {
+        if !self.is_empty() && self.pipeline.bells.somebody_is_hungry() {
+            self.shed();
+            self.announce();
+        }
+    }
+
+    /// Carries `work`, if there is room for it.
+    #[inline]
+    fn carry(&mut self, work: Work) -> bool {
+        if let Work::Interact(id) = work {
+            return self.interactions.push_back(id).is_ok();
+        }
+        if self.works.push(work).is_err() {
+            return false;
+        }
+        // A rendering stays on top: only holders can do it.
+        if let [.., below @ Work::Render(_), top] = self.works.as_mut_slice() {
+            ::core::mem::swap(below, top);
+        }
+        true
+    }
+
+    /// The next that is carried, or an update at home: first what others wait for.
+    pub(crate) fn take(&mut self) -> Option<Work> {
+        let Some(&id) = self.interactions.front() else { return self.works.pop() };
+        let oldest = Work::Interact(id);
+        // Updates wait for the open frame's; for the next frame's nobody does before it is open.
+        let is_awaited = self.pipeline.frame_of(oldest) == self.pipeline.window.open();
+        let before_updates = is_awaited || self.interactions.len() > RESERVE;
+        let other = match self.works.last() {
+            Some(Work::Update(_)) | None if before_updates => None,
+            Some(_) => self.works.pop(),
+            None => self.pop_update(),
+        };
+        other.or_else(|| self.interactions.pop_front().map(Work::Interact))
+    }
+
+    /// An update that is queued at this worker's home.
+    #[inline]
+    fn pop_update(&mut self) -> Option<Work> {
+        let home = self.pipeline.tables.queues.homes.at(self.home);
+        if home.update.looks_empty() { None } else { self.pop(home, Stage::Update) }
+    }
+
+    /// A work unit of `stage` that is queued at a home or for everybody.
+    #[inline]
+    pub(crate) fn pop(&mut self, home: &Home<'_>, stage: Stage) -> Option<Work> {
+        let interact = &self.pipeline.tables.queues.interact;
+        match stage {
+            Stage::BroadPhase => home.enter.pop().map(|unit| Work::Enter(UnitId(unit))),
+            Stage::Interaction => interact.pop().map(|id| Work::Interact(InteractionId(id))),
+            Stage::Update => home.update.pop().map(|unit| Work::Update(UnitId(unit))),
+            Stage::Render => self.pop_render(),
+        }
+    }
+
+    /// A unit of the frame on display. Another holder may have swapped since `display` was read, and the
+    /// queue may then hold units of a frame that may not be rendered yet: those go back, and who has
+    /// looked for them in vain meanwhile is called.
+    pub(crate) fn pop_render(&mut self) -> Option<Work> {
+        let display = self.pipeline.window.display();
+        let queue = &self.pipeline.tables.queues.render[display.parity()];
+        let unit = UnitId(queue.pop()?);
+        let work = Work::Render(unit);
+        if self.pipeline.rendered_frame(unit) == display || seeded!(TagNotChecked) {
+            return Some(work);
+        }
+        self.queue(work);
+        None
+    }
+
+    /// Whether `unit` is another home's, whose worker is to have it if it comes for it in time.
+    #[inline]
+    fn is_at_home_elsewhere(&self, unit: UnitId) -> bool {
+        self.pipeline.tables.home_of(unit) != self.home
+    }
+
+    /// Counts this worker among the hungry, or not.
+    #[inline]
+    pub(crate) fn set_hungry(&mut self, hungry: bool) {
+        if self.hungry != hungry {
+            self.hungry = hungry;
+            self.pipeline.bells.count_hungry(hungry);
+        }
+    }
+
+    /// Gives away what is carried, and any call that this worker was woken by and has not
+    /// answered: whoever called counted on it, and may sleep or have left by now.
+    pub(crate) fn leave(&mut self) {
+        self.set_hungry(false);
+        if seeded!(LeavesWithCarry) {
+            self.works.clear();
+            self.interactions.clear();
+        }
+        self.shed();
+        if seeded!(CallNotPassedOn) {
+            return self.announce();
+        }
+        // Whoever still counts this worker among the sleepers has queued its work before this.
+        fence(site::FENCE_LEAVE);
+        let left = self.pipeline.visible_anywhere(true);
+        self.renders += u32::from(left.contains(Stage::Render));
+        self.queued += u32::from(left.without(Stage::Render) != Stages::NONE);
+        self.announce();
+    }
+
+    pub(crate) fn announce(&mut self) {
+        if seeded!(BatchNotFlushed) && self.queued + self.renders < 3 {
+            return;
+        }
+        if self.queued > 0 || self.renders > 0 {
+            self.pipeline.bells.announce(&self.pipeline.waiting, self.queued, self.renders);
+            (self.queued, self.renders) = (0, 0);
+        }
+    }
+}
+
+impl<E: Environment, W: Waiting> Outputs for Carry<'_, '_, E, W> {
+    #[inline]
+    fn emit(&mut self, work: Work) {
+        if matches!(work, Work::Update(unit) if self.is_at_home_elsewhere(unit)) {
+            self.queue(work);
+            return;
+        }
+        // One work unit is for this worker itself.
+        if (!self.is_empty() && self.pipeline.bells.somebody_is_hungry()) || !self.carry(work) {
+            self.queue(work);
+        }
+    }
+
+    #[inline]
+    fn queue(&mut self, work: Work) {
+        self.pipeline.push(work);
+        match Stage::of(work) {
+            Stage::Render => self.renders += 1,
+            _ => self.queued += 1,
+        }
+    }
+
+    fn renders_visible(&mut self) {
+        self.renders = u32::MAX / 2;
+    }
+
+    fn all_done(&mut self) {
+        (self.queued, self.renders) = (u32::MAX / 2, u32::MAX / 2);
+    }
+}
+
+impl<E: Environment, W: Waiting> Drop for Carry<'_, '_, E, W> {
+    fn drop(&mut self) {
+        self.leave();
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::contacts::{ContactSlot, Contacts, SegmentSlot};
+    use crate::environment::Pair;
+    use crate::error::TableFull;
+    use crate::frame::Frame;
+    use crate::inbox::LetterSlot;
+    use crate::inputs::Inputs;
+    use crate::pipeline::Config;
+    use crate::ring::QueueSlot;
+    use crate::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
+    use crate::wait::{Bell, Epoch};
+    use crate::worker::Step;
+    use std::sync::{Mutex, MutexGuard, PoisonError};
+
+    /// Nothing happens in it.
+    struct Void;
+
+    impl Environment for Void {
+        type Object = ();
+        type Interaction = ();
+        type Contact = ();
+        type Message = ();
+        type Renderer = ();
+        type Error = TableFull;
+
+        fn broad_phase(&self, (): &(), (): &()) -> bool {
+            false
+        }
+
+        fn interact(
+            &self,
+            _: Pair,
+            (): &(),
+            (): &(),
+            (): &mut (),
+            _: &mut Contacts<'_, '_, ()>,
+        ) -> Result<(), TableFull> {
+            Ok(())
+        }
+
+        fn update(
+            &self,
+            _: UnitId,
+            _: Frame,
+            (): &mut (),
+            _: &mut Inputs<'_, '_, Self>,
+        ) -> Result<(), TableFull> {
+            Ok(())
+        }
+
+        fn render(&self, _: UnitId, _: Frame, (): &(), (): &mut ()) -> Result<(), TableFull> {
+            Ok(())
+        }
+
+        fn swap(&self, _: Frame, (): &mut ()) -> Result<(), TableFull> {
+            Ok(())
+        }
+    }
+
+    /// Counts calls of holders.
+    #[derive(Default)]
+    struct Calls(Mutex<u32>);
+
+    impl Calls {
+        fn count(&self) -> MutexGuard<'_, u32> {
+            self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        }
+    }
+
+    impl Waiting for Calls {
+        fn sleep(&self, _: &Bell, _: Epoch) {}
+
+        fn wake(&self, bell: &Bell, count: u32) {
+            *self.count() += if bell.is_for_holders() { count } else { 0 };
+        }
+    }
+
+    #[test]
+    fn whoever_looked_in_vain_for_a_rendering_that_is_put_back_is_called() {
+        let memory = Memory {
+            units: &mut [(); 2].map(UnitSlot::new),
+            interactions: &mut [const { InteractionSlot::spare(()) }; 2],
+            contacts: &mut [const { ContactSlot::new() }; 2],
+            segments: &mut [const { SegmentSlot::new() }; 2],
+            letters: &mut [const { LetterSlot::new() }],
+            queues: &mut [const { QueueSlot::new() }; queue_slots(2, 2, 1, 1)],
+        };
+        let config = Config { tokens: 2, ..Config::default() };
+        let pipeline = Pipeline::<Void, _>::new(memory, config, Calls::default())
+            .unwrap_or_else(|error| panic!("{error}"));
+        // As after a swap since the frame on display was read: no unit of it is in this queue.
+        assert_eq!(pipeline.tables.queues.render[0].push(0), Ok(()));
+        let mut worker = pipeline.worker();
+        assert!(pipeline.token(()).is_ok_and(|token| worker.hold(token).is_ok()));
+        // Another holder, about to sleep.
+        pipeline.bells.holders.sleep_unless(&pipeline.waiting, || {
+            assert_eq!(worker.step(&Void), Ok(Step::Idle));
+            false
+        });
+        assert_eq!(*pipeline.waiting.count(), 1);
+    }
+}
