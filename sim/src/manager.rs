@@ -25,7 +25,7 @@ use crate::timeline::Timeline;
 pub struct Settings {
     /// What drives the stages.
     pub executor: ExecutorKind,
-    /// Threads, the calling one included: 1 to [`MAX_THREADS`].
+    /// Threads, the calling one included (besides the calling one for rayon's executors): 1 to [`MAX_THREADS`].
     pub threads: usize,
     /// Whether each thread is bound to a core, where the system can (pipeline only).
     pub pinned: bool,

@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 use std::hash::Hasher;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use dualframe_core::error::{Table, TableFull};
 use dualframe_sim::behavior::{Behavior, Input};
@@ -138,5 +139,39 @@ fn too_many_objects_or_threads() {
         let settings = Settings { threads, ..Settings::default() };
         let refused = VeManager::new(scene(1), settings).err().expect("beyond the limit");
         assert!(matches!(refused, ExecutorError::Threads { threads: t } if t == threads));
+    }
+}
+
+#[test]
+fn nothing_at_all() {
+    for &executor in ExecutorKind::ALL {
+        for grain in [Grain::Spatial, Grain::Pairwise] {
+            let mut empty = scene(1);
+            empty.objects.clear();
+            let (settings, mut swapped) = (Settings { executor, grain, ..Settings::default() }, 0);
+            let mut manager = VeManager::new(empty, settings).expect("valid settings");
+            let outcome = manager.run(3, &mut NullRenderer::new(), &mut |_| swapped += 1);
+            assert!(outcome.is_ok(), "{executor:?}, {grain:?}: {outcome:?}");
+            assert_eq!((manager.frame(), swapped), (3, 3), "{executor:?}, {grain:?}");
+        }
+    }
+}
+
+#[test]
+fn a_renderer_that_panics_takes_no_object_along() {
+    for &executor in ExecutorKind::ALL {
+        let settings = Settings { executor, threads: 2, ..Settings::default() };
+        let mut manager = VeManager::new(scene(100), settings).expect("valid settings");
+        let objects = |manager: &VeManager| {
+            let mut count = 0;
+            manager.visit(&mut |_| count += 1);
+            count
+        };
+        let all = objects(&manager);
+        let ended = catch_unwind(AssertUnwindSafe(|| {
+            manager.run(3, &mut NullRenderer::new(), &mut |record| assert_eq!(record.frame, 0))
+        }));
+        assert!(ended.is_err(), "{executor:?}");
+        assert_eq!(objects(&manager), all, "{executor:?}");
     }
 }

@@ -46,7 +46,7 @@ impl Arguments {
 
     /// Frames of a run: those asked for, or else about as many as update `updates` particles.
     pub(crate) fn frames_for(&self, objects: usize, updates: usize) -> u64 {
-        let usual = (updates / objects).max(20) as u64;
+        let usual = (updates / objects.max(1)).max(20) as u64;
         if self.test { 3 } else { self.frames.unwrap_or(usual) }
     }
 }

@@ -28,7 +28,7 @@ pub(super) struct Engine {
     outcomes: Vec<Outcome>,
 }
 
-/// What belongs to one thread. The locks are never contended.
+/// What belongs to one thread. The locks are never contended: a thread does one callback after the other.
 pub(super) struct Worker {
     pub(super) clock: Clock,
     scratch: Mutex<Scratch>,

@@ -160,6 +160,10 @@ pub trait Executor {
     /// One of the pipeline's tables is full. The environment cannot go on then: a frame without some
     /// of its interactions would not be the same for every schedule. Or the pipeline's pool was enlarged
     /// and the threads cannot be had; frames before that are done, and it can go on.
+    ///
+    /// # Panics
+    /// If the renderer or `on_frame` does. The objects are still there, some of them a frame ahead of others:
+    /// they can be looked at, but not be advanced any more as if nothing had happened.
     fn advance(
         &mut self,
         frames: u64,

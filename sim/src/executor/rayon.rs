@@ -6,7 +6,9 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::ExecutorError;
 use super::parallel_for::{LoopExecutor, ParallelFor};
 
-/// The stages up to update on a rayon pool; the calling thread renders.
+/// The stages up to update on a rayon pool of as many threads as asked for; the calling one, besides them,
+/// renders. Callbacks must not use rayon: a thread that waits in one for another may begin the next callback,
+/// and would then wait for itself.
 pub type RayonExecutor = LoopExecutor<RayonLoops>;
 
 /// Rayon's parallel iterators, on a pool of their own.

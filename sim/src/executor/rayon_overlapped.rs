@@ -20,7 +20,8 @@ use crate::timeline::Timeline;
 
 /// As [`RayonExecutor`], but every update also copies what a renderer sees, and the calling thread
 /// renders that copy while the pool computes the next frame: the best overlap of rendering that can
-/// be had without the pipeline. The calling thread is one more than the pool's.
+/// be had without the pipeline. The calling thread is one more than the pool's. Callbacks must not use rayon,
+/// as there.
 ///
 /// [`RayonExecutor`]: super::RayonExecutor
 pub struct RayonOverlappedExecutor {

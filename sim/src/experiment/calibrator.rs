@@ -4,13 +4,12 @@
 //! share nothing show lost cores; a ping-pong between two threads shows slow communication, which the
 //! first do not notice.
 
-use std::sync::Barrier;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use super::statistics::Quartiles;
-use super::work::{seconds_of, steps_per_second};
+use super::work::{seconds_of, spin, steps_per_second};
 
 /// Seconds of one repetition of the busy threads; usually 0.002, long against the time it takes to
 /// start them together and short against a round.
@@ -77,13 +76,19 @@ impl Calibrator {
     fn gain(&self) -> f64 {
         // The fastest: what one thread does when nothing disturbs it.
         let alone = (0..REPETITIONS).map(|_| seconds_of(self.steps)).fold(f64::INFINITY, f64::min);
-        let start = Barrier::new(2);
-        let repeat = || -> Vec<f64> {
-            let once = || {
-                start.wait();
-                seconds_of(self.steps)
+        let ready = AtomicUsize::new(0);
+        let repeat = || -> Vec<[Instant; 2]> {
+            let once = |repetition| {
+                let came = Instant::now();
+                // Relaxed: nothing is handed over.
+                ready.fetch_add(1, Ordering::Relaxed);
+                while ready.load(Ordering::Relaxed) < 2 * (repetition + 1) {
+                    thread::yield_now();
+                }
+                spin(self.steps);
+                [came, Instant::now()]
             };
-            (0..REPETITIONS).map(|_| once()).collect()
+            (0..REPETITIONS).map(once).collect()
         };
         let (own, other) = thread::scope(|scope| {
             let other = scope.spawn(repeat);
@@ -91,9 +96,16 @@ impl Calibrator {
         });
         let Ok(other) = other else { return 0.0 };
         // The mean, so that one repetition without a core shows.
-        let slowest: f64 = own.iter().zip(&other).map(|(own, other)| own.max(*other)).sum();
-        2.0 * alone * REPETITIONS as f64 / slowest
+        let took: f64 = own.iter().zip(&other).map(|(&own, &other)| together(own, other)).sum();
+        2.0 * alone * REPETITIONS as f64 / took
     }
+}
+
+/// Seconds from when both had come to when both were done: not each one's own, for two that take turns on one
+/// core are as fast by their own clocks as two on cores of their own.
+fn together(one: [Instant; 2], other: [Instant; 2]) -> f64 {
+    let [came, done] = [0, 1].map(|end| one[end].max(other[end]));
+    done.duration_since(came).as_secs_f64()
 }
 
 /// Seconds for a word to go from one thread to another.
@@ -142,6 +154,15 @@ mod tests {
         let phase = Calibrator::default().phase();
         assert!(phase.gain > 0.0 && phase.gain.is_finite(), "{phase:?}");
         assert!(phase.ping_pong > 0.0 && phase.ping_pong.is_finite(), "{phase:?}");
+    }
+
+    #[test]
+    fn taking_turns_is_not_working_together() {
+        let at = |began: Instant| move |millis| began + Duration::from_millis(millis);
+        let at = at(Instant::now());
+        let spans = |spans: [[u64; 2]; 2]| together(spans[0].map(at), spans[1].map(at));
+        assert_eq!(spans([[0, 3], [1, 3]]), 0.002, "on two cores, when the second one came");
+        assert_eq!(spans([[0, 3], [1, 5]]), 0.004, "on one core, one after the other");
     }
 
     #[test]

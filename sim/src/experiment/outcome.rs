@@ -159,14 +159,44 @@ impl Outcome {
 
 /// How many rounds of some races were marked, in words.
 pub(super) fn marked<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>) -> String {
-    let (mut bad, mut all) = (0, 0);
+    let (mut all, mut left_out, mut shown) = (0, 0, 0);
     for Outcome { series, .. } in outcomes {
-        bad += series.marked();
         all += series.rounds().len();
+        match series.best_rounds() {
+            Rounds::Good => left_out += series.marked(),
+            Rounds::All => shown += series.marked(),
+        }
     }
-    match bad {
-        0 => format!("None of the {all} rounds was marked."),
-        _ if bad == all => format!("All {all} rounds were marked as disturbed; they are shown."),
-        _ => format!("{bad} of {all} rounds were marked as disturbed and are not in the figure."),
+    in_words(all, left_out, shown)
+}
+
+/// Of `all` rounds so many were marked and left out, and so many marked and shown, for want of others.
+fn in_words(all: usize, left_out: usize, shown: usize) -> String {
+    let bad = left_out + shown;
+    match (left_out, shown) {
+        (0, 0) => format!("None of the {all} rounds was marked."),
+        _ if shown == all => format!("All {all} rounds were marked as disturbed; they are shown."),
+        (_, 0) => {
+            format!("{bad} of {all} rounds were marked as disturbed and are not in the figure.")
+        }
+        _ => format!(
+            "{bad} of {all} rounds were marked as disturbed; {shown} of them are in the figure, where \
+             there are no others."
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_out_is_said() {
+        assert_eq!(in_words(20, 0, 0), "None of the 20 rounds was marked.");
+        let left_out = "5 of 20 rounds were marked as disturbed and are not in the figure.";
+        assert_eq!(in_words(20, 5, 0), left_out);
+        assert_eq!(in_words(20, 0, 20), "All 20 rounds were marked as disturbed; they are shown.");
+        let mixed = "8 of 20 rounds were marked as disturbed; 5 of them are in the figure, where there are no others.";
+        assert_eq!(in_words(20, 3, 5), mixed);
     }
 }

@@ -23,7 +23,7 @@ pub const WARM_UP: u64 = 16;
 pub struct Runner {
     /// What drives the stages.
     pub executor: ExecutorKind,
-    /// Threads, the calling one included.
+    /// Threads, the calling one included; besides the calling one for rayon's executors.
     pub threads: usize,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Frames run in batches of up to [`FRAMES_PER_BLOCKING`](crate::blocking::FRAMES_PER_BLOCKING). Between two
 //! batches the pipeline is at rest: blocks are formed anew before every frame whose number is a multiple of it,
-//! tables grow if they have come to be half full, threads join. Threads, and the memory they work in, are
+//! contacts are given more room if the last frame came to half of it, threads join. Threads, and the memory they work in, are
 //! kept from one run to the next.
 
 mod clock;
@@ -11,7 +11,9 @@ mod memory;
 mod run;
 mod team;
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 
 use dualframe_core::error::TableFull;
 use dualframe_core::inbox::From;
@@ -145,17 +147,28 @@ impl PipelineExecutor {
             homes: self.config.homes,
             most_contacts,
         };
-        let (done, end) = context.run(
-            frames,
-            pipeline,
-            regrouping,
-            Screen { renderer, on_frame, pairs: PairCount::default() },
-        );
+        let screen = Screen { renderer, on_frame, pairs: PairCount::default() };
+        let run = AssertUnwindSafe(|| context.run(frames, pipeline, regrouping, screen));
+        let ended = catch_unwind(run);
         let report = report.into_inner().unwrap_or_else(PoisonError::into_inner);
         self.tables.unload(&mut self.blocks);
-        self.frame += done;
         (self.seconds, self.failure) = (report.seconds, report.failure);
+        let (done, end) = ended.unwrap_or_else(|panic| resume_unwind(panic));
+        self.frame += done;
         self.failure.map_or(Ok(end), |full| Err(full.into()))
+    }
+
+    /// A frame without objects: it has no last one, by which it would be swapped.
+    fn swap_nothing(
+        &mut self,
+        renderer: &mut dyn Renderer,
+        on_frame: &mut dyn FnMut(&FrameRecord),
+    ) {
+        renderer.swap(self.frame);
+        let (swapped, pairs) = (Instant::now(), PairCount::default());
+        on_frame(&FrameRecord { frame: self.frame, swapped, pairs });
+        self.outside.swapped(self.frame);
+        self.frame += 1;
     }
 }
 
@@ -172,6 +185,10 @@ impl Executor for PipelineExecutor {
         }
         self.outside.begin(self.frame);
         while self.frame < end {
+            if self.blocks.is_empty() {
+                self.swap_nothing(renderer, on_frame);
+                continue;
+            }
             self.team.grow(self.pool.threads())?;
             if self.run(end - self.frame, renderer, on_frame)? == End::Contacts {
                 self.tables.double_contacts();
