@@ -2,8 +2,8 @@
 //!
 //! Frames run in batches of up to [`FRAMES_PER_BLOCKING`](crate::blocking::FRAMES_PER_BLOCKING). Between two
 //! batches the pipeline is at rest: blocks are formed anew before every frame whose number is a multiple of it,
-//! contacts are given more room if the last frame came to half of it, threads join. Threads, and the memory they work in, are
-//! kept from one run to the next.
+//! contacts are given more room if the last frame came to half of it, threads join. Threads, and the memory
+//! they work in, are kept from one run to the next.
 
 mod clock;
 mod host;
