@@ -170,3 +170,36 @@ fn hidden_objects_are_not_drawn() {
     let (_, _, renderer) = run(&mut serial(Scene::new(objects, no_rules())), 5);
     assert_eq!(renderer.draws(), 5);
 }
+
+/// Puts another object, of another number, group and kind, in the place of the receiver.
+#[derive(Debug)]
+struct Replace;
+
+impl Custom for Replace {
+    fn process(&self, object: &mut Object) {
+        let Geometry::Mesh(mesh) = object.geometry.clone() else { return };
+        let (id, group) = (ObjectId(object.id().0 + 1), Group(9));
+        *object = Object::new(id, group, Geometry::Mesh(mesh), Fixed).solitary();
+    }
+}
+
+#[test]
+fn an_object_that_is_replaced_keeps_number_group_and_kind() {
+    const REPLACED: ObjectId = ObjectId(3);
+    let mut states = Vec::new();
+    for (name, mut executor) in executors(|| particles(100, true, true), Grain::Spatial, 2) {
+        executor.mailbox().post(REPLACED, Message::Custom(Box::new(Replace)));
+        // Until blocks have been formed anew twice.
+        let (_, state, _) = run(&mut *executor, 70);
+        let mut ids = Vec::new();
+        executor.visit(&mut |object| {
+            let kind = (object.group(), object.is_solitary(), object.is_fixed());
+            assert!(object.id() != REPLACED || kind == (Group(0), false, false), "{name}: {kind:?}");
+            ids.push(object.id());
+        });
+        ids.sort_unstable();
+        assert!(ids.into_iter().eq((0..106).map(ObjectId)), "{name}: nobody is lost");
+        states.push(state);
+    }
+    assert!(states.iter().all(|state| *state == states[0]), "{states:x?}");
+}

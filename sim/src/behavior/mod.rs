@@ -59,7 +59,8 @@ pub trait Behavior: Any + Send + Sync {
     }
 
     /// Copies what a renderer may ask of this behaviour to that of a snapshot, which is a
-    /// [`Fixed`] at first; by default it may ask nothing.
+    /// [`Fixed`] at first; by default it may ask nothing. A panic here ends the run: a picture is not an
+    /// update, of which an object could be excluded.
     fn show_in(&self, _snapshot: &mut Box<dyn Behavior>) {}
 
     /// The bit that a tool is drilling with, if it is a drill; by default it is none.

@@ -195,7 +195,12 @@ impl Object {
                 }
             }
             Message::Remove => self.quarantine(Fault { kind: FaultKind::Removed, frame }),
-            Message::Custom(custom) => custom.process(self),
+            Message::Custom(custom) => {
+                let Self { id, group, solitary, fixed, .. } = *self;
+                custom.process(self);
+                // By these it is found and grouped, also if another was put in its place.
+                (self.id, self.group, self.solitary, self.fixed) = (id, group, solitary, fixed);
+            }
             Message::Stiffness { .. }
             | Message::Damping(_)
             | Message::Pull { .. }
