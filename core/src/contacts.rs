@@ -83,8 +83,13 @@ impl Room {
     }
 
     /// Slots taken so far.
-    pub(crate) fn used(&self) -> u32 {
+    fn used(&self) -> u32 {
         self.used.load(site::POOL_CLAIM)
+    }
+
+    /// Slots asked for so far, also in vain.
+    pub(crate) fn asked(&self) -> u32 {
+        self.used().saturating_add(self.refused.load(site::POOL_CLAIM))
     }
 
     /// Claims `count` slots, or none: exactly, so that a refused claim costs no room and no number
@@ -152,9 +157,9 @@ impl<'m, C: Copy> Pools<'m, C> {
         self.rooms[frame.parity()].reset();
     }
 
-    /// Slots that `frame` has claimed so far.
-    pub(crate) fn used(&self, frame: Frame) -> u32 {
-        self.rooms[frame.parity()].used()
+    /// Slots that `frame` has asked for so far.
+    pub(crate) fn asked(&self, frame: Frame) -> u32 {
+        self.rooms[frame.parity()].asked()
     }
 
     /// Writes `records`, whose segments are still to be marked, and returns the index of the first.
@@ -292,7 +297,7 @@ mod tests {
         let mut pushed = Contacts::new(&pools, Frame(0));
         let full = TableFull { table: Table::Contacts, capacity: 4, needed: 5 };
         assert_eq!(pushed.push(&[1, 2, 3, 4, 5]), Err(full));
-        assert_eq!((pushed.first(), pools.used(Frame(0))), (NONE, 0));
+        assert_eq!((pushed.first(), pools.rooms[0].used(), pools.asked(Frame(0))), (NONE, 0, 5));
     }
 
     #[test]

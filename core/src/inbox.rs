@@ -56,9 +56,11 @@ pub struct From {
     pub sequence: u32,
 }
 
-/// A letter that did not fit, with the message back.
+/// A letter that did not fit, back as it was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rejected<M> {
+    /// Whose it is, and its place among theirs.
+    pub from: From,
     /// What was to be posted.
     pub message: M,
     /// Why it was not.
@@ -119,7 +121,7 @@ impl<'m, M: Send + Sync> Post<'m, M> {
         let Some((index, slot)) = free.and_then(|index| Some((index, self.slot(index)?))) else {
             let capacity = self.slots.len();
             let full = TableFull { table: Table::Letters, capacity, needed: capacity + 1 };
-            return Err(Rejected { message, full });
+            return Err(Rejected { from, message, full });
         };
         // SAFETY: the index came from the free ring, so the slot is this caller's alone until
         // `put` publishes it.

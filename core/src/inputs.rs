@@ -26,7 +26,7 @@ pub struct Inputs<'t, 'm, E: Environment + ?Sized> {
     unit: UnitId,
     frame: Frame,
     mail: Mail<'t, 'm, E::Message>,
-    /// Letters posted so far by this update.
+    /// Letters posted so far by this update, or rejected: a rejected one keeps its place.
     posted: u32,
     /// Not `Sync`: interactions are sorted by whoever asks for them.
     one_thread: PhantomData<cell::Cell<()>>,
@@ -98,7 +98,7 @@ impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
     /// same sender and place in the sequence would come in the order of arrival.
     ///
     /// # Errors
-    /// [`Rejected`] with the message if all letters are under way, or if there is no unit `to`.
+    /// [`Rejected`] with the letter if all letters are under way, or if there is no unit `to`.
     pub fn post(
         &mut self,
         to: UnitId,
@@ -106,8 +106,7 @@ impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
         message: E::Message,
     ) -> Result<(), Rejected<E::Message>> {
         let from = From { sender, sequence: self.posted };
-        self.tables.post(to, self.frame, from, message)?;
-        self.posted += 1;
-        Ok(())
+        self.posted = self.posted.wrapping_add(1);
+        self.tables.post(to, self.frame, from, message)
     }
 }

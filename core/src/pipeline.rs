@@ -133,7 +133,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     /// interface. It is processed by `to`'s first update in a later frame than the one now open.
     ///
     /// # Errors
-    /// [`Rejected`] with the message if all letters are under way, or if there is no unit `to`.
+    /// [`Rejected`] with the letter if all letters are under way, or if there is no unit `to`.
     pub fn post(
         &self,
         to: UnitId,
@@ -170,12 +170,12 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         })
     }
 
-    /// The largest number of candidates and of contacts that a frame in flight has used so far; at rest,
-    /// those of the last frame.
+    /// The largest number of candidates and of contacts that a frame in flight has asked room for so far, found
+    /// or not; at rest, those of the last frame.
     pub fn high_water(&mut self) -> (usize, usize) {
         let both = [Frame(0), Frame(1)];
-        let candidates = both.map(|frame| self.tables.candidates_used(frame));
-        let contacts = both.map(|frame| self.tables.pools.used(frame));
+        let candidates = both.map(|frame| self.tables.candidates_asked(frame));
+        let contacts = both.map(|frame| self.tables.pools.asked(frame));
         (candidates[0].max(candidates[1]) as usize, contacts[0].max(contacts[1]) as usize)
     }
 

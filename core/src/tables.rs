@@ -248,7 +248,7 @@ impl<'m, E: Environment + ?Sized> Tables<'m, E> {
         let Some(unit) = self.units.get(to.index()) else {
             let (capacity, needed) = (self.units.len(), to.index().saturating_add(1));
             let full = TableFull { table: Table::Units, capacity, needed };
-            return Err(Rejected { message, full });
+            return Err(Rejected { from, message, full });
         };
         self.post.post(&unit.inbox, stamp, from, message)
     }
@@ -267,9 +267,9 @@ impl<'m, E: Environment + ?Sized> Tables<'m, E> {
         (claimed.map(move |place| InteractionId(first + place)), outcome)
     }
 
-    /// Candidate slots that `frame` has claimed so far.
-    pub(crate) fn candidates_used(&self, frame: Frame) -> u32 {
-        self.gathering.found[frame.parity()].used()
+    /// Candidate slots that `frame` has asked for so far.
+    pub(crate) fn candidates_asked(&self, frame: Frame) -> u32 {
+        self.gathering.found[frame.parity()].asked()
     }
 
     /// Empties what belonged to the frame before last, of the same parity as `frame`.

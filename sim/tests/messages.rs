@@ -194,7 +194,10 @@ fn an_object_that_is_replaced_keeps_number_group_and_kind() {
         let mut ids = Vec::new();
         executor.visit(&mut |object| {
             let kind = (object.group(), object.is_solitary(), object.is_fixed());
-            assert!(object.id() != REPLACED || kind == (Group(0), false, false), "{name}: {kind:?}");
+            assert!(
+                object.id() != REPLACED || kind == (Group(0), false, false),
+                "{name}: {kind:?}"
+            );
             ids.push(object.id());
         });
         ids.sort_unstable();

@@ -81,7 +81,8 @@ impl Environment for Flood {
             match inputs.post(unit, unit.0, letter) {
                 Ok(()) => self.posted.fetch_add(1, SeqCst),
                 Err(rejected) => {
-                    assert_eq!(rejected.message, letter, "the message comes back");
+                    let from = Sender { sender: unit.0, sequence: letter };
+                    assert_eq!((rejected.from, rejected.message), (from, letter), "it comes back");
                     outcome = Err(rejected.full);
                     self.posts_refused.fetch_add(1, SeqCst)
                 }
@@ -158,6 +159,12 @@ impl Sizes {
             let errors = drive(&pipeline, flood);
             assert_eq!(flood.swaps.load(SeqCst), frames as usize, "every frame swaps");
             assert_eq!(pipeline.frame(), Frame(frames));
+            let (candidates, contacts) = pipeline.high_water();
+            for full in &errors {
+                let interactions = full.table == Table::Interactions;
+                let asked = if interactions { candidates } else { contacts };
+                assert!(full.table == Table::Letters || asked >= full.needed, "{asked}: {full}");
+            }
             errors
         })
     }

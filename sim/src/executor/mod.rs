@@ -128,7 +128,7 @@ pub enum ExecutorError {
     /// The pipeline cannot be built.
     #[error(transparent)]
     Setup(#[from] dualframe_core::error::SetupError),
-    /// One of the pipeline's tables is full.
+    /// The pipeline's table of blocks that meet is full.
     #[error(transparent)]
     Table(#[from] dualframe_core::error::TableFull),
     /// Rayon's pool could not be built.
@@ -157,9 +157,10 @@ pub trait Executor {
     /// swapped. The renderer is called by the calling thread only.
     ///
     /// # Errors
-    /// One of the pipeline's tables is full. The environment cannot go on then: a frame without some
-    /// of its interactions would not be the same for every schedule. Or the pipeline's pool was enlarged
-    /// and the threads cannot be had; frames before that are done, and it can go on.
+    /// More than 20,000 objects crowd so fast that the pipeline's table of blocks that meet, which grows every
+    /// [`FRAMES_PER_BLOCKING`](crate::blocking::FRAMES_PER_BLOCKING) frames, is full. The environment cannot go
+    /// on then: a frame without some of its interactions would not be the same for every schedule. Or the
+    /// pipeline's pool was enlarged and the threads cannot be had; frames before that are done, and it can go on.
     ///
     /// # Panics
     /// If the renderer or `on_frame` does. The objects are still there, some of them a frame ahead of others:

@@ -8,9 +8,11 @@ use dualframe_core::contacts::Contacts;
 use dualframe_core::environment::{Environment, Pair};
 use dualframe_core::error::TableFull;
 use dualframe_core::frame::Frame;
+use dualframe_core::inbox;
 use dualframe_core::inputs::Inputs;
 use dualframe_core::unit::UnitId;
 
+use super::overflow::Overflow;
 use crate::behavior::{Room, Workspace};
 use crate::block::Block;
 use crate::executor::FrameRecord;
@@ -56,6 +58,7 @@ pub(super) struct Shared<'s> {
     pub(super) stages: &'s Stages,
     pub(super) outside: &'s Outside,
     pub(super) register: &'s Register,
+    pub(super) overflow: &'s Overflow,
     /// The number of the pipeline's frame 0.
     pub(super) first_frame: u64,
     /// What each worker makes room for.
@@ -82,6 +85,28 @@ impl From<Block> for Unit {
     }
 }
 
+/// What the interaction of two units leaves to their updates, besides contacts.
+#[derive(Default)]
+pub(super) struct Found {
+    candidates: u32,
+    collisions: u32,
+    /// All records, if the pipeline's table had no room for them.
+    late: Option<Box<ContactBuffer>>,
+}
+
+impl Found {
+    fn new(count: PairCount) -> Self {
+        // As many as a block has objects, squared.
+        let PairCount { candidates, collisions } = count;
+        Self { candidates: candidates as u32, collisions: collisions as u32, late: None }
+    }
+
+    fn count(&self) -> PairCount {
+        let [candidates, collisions] = [self.candidates, self.collisions].map(u64::from);
+        PairCount { candidates, collisions }
+    }
+}
+
 /// A message to one of the objects of a block.
 pub(super) struct Parcel {
     pub(super) to: ObjectId,
@@ -93,7 +118,7 @@ pub(super) struct Own {
     scratch: RefCell<Scratch>,
     workspace: RefCell<Workspace>,
     results: RefCell<ContactBuffer>,
-    letters: RefCell<Vec<Parcel>>,
+    letters: RefCell<Vec<(inbox::From, Parcel)>>,
 }
 
 impl Own {
@@ -134,7 +159,7 @@ pub(super) struct Screen<'s> {
 
 impl<'s> Environment for Host<'s> {
     type Object = Unit;
-    type Interaction = PairCount;
+    type Interaction = Found;
     type Contact = ContactRecord;
     type Message = Parcel;
     type Renderer = Screen<'s>;
@@ -153,7 +178,7 @@ impl<'s> Environment for Host<'s> {
         pair: Pair,
         a: &Unit,
         b: &Unit,
-        count: &mut PairCount,
+        found: &mut Found,
         contacts: &mut Contacts<'_, '_, ContactRecord>,
     ) -> Result<(), TableFull> {
         let (stages, scratch) = (self.shared.stages, &mut *self.own.scratch.borrow_mut());
@@ -165,8 +190,11 @@ impl<'s> Environment for Host<'s> {
             stages.interact(&a.block, &b.block, scratch, results)
         };
         // A buffer in growing memory is never full.
-        *count = counted.unwrap_or_default();
-        contacts.push(results.records())
+        *found = Found::new(counted.unwrap_or_default());
+        if contacts.push(results.records()).is_err() {
+            found.late = Some(Box::new(results.clone()));
+        }
+        Ok(())
     }
 
     fn update(
@@ -179,14 +207,15 @@ impl<'s> Environment for Host<'s> {
         let shared = self.shared;
         let letters = &mut *self.own.letters.borrow_mut();
         letters.clear();
-        while let Some((_, parcel)) = inputs.next_letter() {
-            letters.push(parcel);
-        }
+        letters.extend(std::iter::from_fn(|| inputs.next_letter()));
         let number = shared.number(frame);
+        if shared.overflow.deliver(id, number, |letter| letters.push(letter)) {
+            letters.sort_unstable_by_key(|&(from, _)| from);
+        }
         let from_outside = shared.outside.due(number);
         let mail = |object| {
-            let own = letters.iter().filter(move |parcel| parcel.to == object);
-            own.map(|parcel| &parcel.message).chain(from_outside.to(object))
+            let own = letters.iter().filter(move |(_, parcel)| parcel.to == object);
+            own.map(|(_, parcel)| &parcel.message).chain(from_outside.to(object))
         };
         let workspace = &mut *self.own.workspace.borrow_mut();
         let Unit { block, pairs } = unit;
@@ -194,20 +223,20 @@ impl<'s> Environment for Host<'s> {
         // The block brings them into its objects' order itself.
         let results = inputs.interactions_in_any_order().flat_map(|interaction| {
             if interaction.other >= id {
-                *pairs += *interaction.state;
+                *pairs += interaction.state.count();
             }
-            interaction.contacts
+            let late = interaction.state.late.as_deref().map(ContactBuffer::records);
+            interaction.contacts.chain(late)
         });
-        let mut outcome = Ok(());
         let mut post = |from: ObjectId, to: ObjectId, message| {
             // A letter to nobody is lost, as `Input::post` says.
             let Some(unit) = shared.register.unit_of(to) else { return };
             if let Err(rejected) = inputs.post(unit, from.0, Parcel { to, message }) {
-                outcome = Err(rejected.full);
+                shared.overflow.keep(number + 1, unit, rejected.from, rejected.message);
             }
         };
         shared.stages.update(number, block, results, workspace, mail, &mut post);
-        outcome
+        Ok(())
     }
 
     fn render(

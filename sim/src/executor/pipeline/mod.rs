@@ -2,12 +2,14 @@
 //!
 //! Frames run in batches of up to [`FRAMES_PER_BLOCKING`](crate::blocking::FRAMES_PER_BLOCKING). Between two
 //! batches the pipeline is at rest: blocks are formed anew before every frame whose number is a multiple of it,
-//! contacts are given more room if the last frame came to half of it, threads join. Threads, and the memory
-//! they work in, are kept from one run to the next.
+//! a table that was too small, or half full, is given more room, threads join. Until it has room, contacts
+//! and letters that do not fit are kept beside it. Threads, and the memory they work in, are kept from one run
+//! to the next.
 
 mod clock;
 mod host;
 mod memory;
+mod overflow;
 mod run;
 mod team;
 
@@ -23,6 +25,7 @@ pub use dualframe_core::frame::Entry;
 
 use self::host::{Parcel, Register, Screen, Shared};
 use self::memory::{Tables, modelled_interactions, spare_interactions};
+use self::overflow::Overflow;
 use self::run::{Context, End, Regrouping, Report};
 use self::team::Team;
 use super::outside::Outside;
@@ -94,7 +97,7 @@ impl PipelineExecutor {
             mail.push((from, Parcel { to, message }));
         });
         Ok(Self {
-            tables: Tables::new(&blocks, interactions, mail.len(), homes),
+            tables: Tables::new(&blocks, interactions, homes),
             register: Register::new(&blocks),
             room: Room::of(blocks.iter()),
             stages,
@@ -120,11 +123,13 @@ impl PipelineExecutor {
         renderer: &mut dyn Renderer,
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<End, ExecutorError> {
-        let most_contacts = self.tables.contact_capacity() / 2;
+        let limits = self.tables.limits(self.blocks.len());
+        let overflow = Overflow::default();
         let shared = Shared {
             stages: &self.stages,
             outside: &self.outside,
             register: &self.register,
+            overflow: &overflow,
             first_frame: self.frame,
             room: self.room,
         };
@@ -145,7 +150,7 @@ impl PipelineExecutor {
             blocking: (self.grain == Grain::Spatial).then_some(&mut self.blocking),
             mail: &mut self.mail,
             homes: self.config.homes,
-            most_contacts,
+            limits,
         };
         let screen = Screen { renderer, on_frame, pairs: PairCount::default() };
         let run = AssertUnwindSafe(|| context.run(frames, pipeline, regrouping, screen));
@@ -190,8 +195,8 @@ impl Executor for PipelineExecutor {
                 continue;
             }
             self.team.grow(self.pool.threads())?;
-            if self.run(end - self.frame, renderer, on_frame)? == End::Contacts {
-                self.tables.double_contacts();
+            if let End::Outgrown(table) = self.run(end - self.frame, renderer, on_frame)? {
+                self.tables.double(table, self.blocks.len());
             }
         }
         Ok(())

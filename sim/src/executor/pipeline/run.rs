@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard};
 use std::thread;
 
-use dualframe_core::error::TableFull;
+use dualframe_core::error::{Table, TableFull};
 use dualframe_core::inbox::From;
 use dualframe_core::pipeline::Pipeline;
 use dualframe_core::token::Token;
@@ -11,6 +11,7 @@ use dualframe_core::worker::Step;
 
 use super::clock::StageClock;
 use super::host::{Host, Parcel, Screen, Shared};
+use super::memory::Limits;
 use super::team::Team;
 use crate::blocking::{Blocking, FRAMES_PER_BLOCKING, Grain};
 use crate::executor::{StageSeconds, world};
@@ -30,8 +31,8 @@ pub(super) struct Report {
 pub(super) enum End {
     /// All frames are done, or a table failed.
     Done,
-    /// The table of contacts is to grow.
-    Contacts,
+    /// A table is to grow.
+    Outgrown(Table),
     /// More threads are wanted than there are.
     Threads,
 }
@@ -43,28 +44,39 @@ pub(super) struct Regrouping<'x> {
     /// Objects' messages for the next frame.
     pub(super) mail: &'x mut Vec<(From, Parcel)>,
     pub(super) homes: u32,
-    /// Contact records of a frame beyond which the tables are to grow.
-    pub(super) most_contacts: usize,
+    /// What of the tables may be used before they are to grow.
+    pub(super) limits: Limits,
 }
 
 impl Regrouping<'_> {
-    /// Posts the messages for the next frame to wherever their objects are now.
-    fn post_mail(
-        &mut self,
-        shared: &Shared<'_>,
-        pipeline: &SimPipeline<'_, '_>,
-    ) -> Result<(), TableFull> {
+    /// Posts the messages for the next frame, which is `due`, to wherever their objects are now.
+    fn post_mail(&mut self, due: u64, shared: &Shared<'_>, pipeline: &SimPipeline<'_, '_>) {
         for (from, parcel) in self.mail.drain(..) {
             // A message to nobody is lost.
-            if let Some(unit) = shared.register.unit_of(parcel.to) {
-                pipeline.post(unit, from, parcel).map_err(|rejected| rejected.full)?;
+            if let Some(unit) = shared.register.unit_of(parcel.to)
+                && let Err(rejected) = pipeline.post(unit, from, parcel)
+            {
+                shared.overflow.keep(due, unit, rejected.from, rejected.message);
             }
         }
-        Ok(())
     }
 
-    fn take_mail(&mut self, pipeline: &mut SimPipeline<'_, '_>) {
+    fn take_mail(&mut self, shared: &Shared<'_>, pipeline: &mut SimPipeline<'_, '_>) {
         pipeline.take_letters(|_, from, parcel| self.mail.push((from, parcel)));
+        shared.overflow.empty(|letter| self.mail.push(letter));
+    }
+
+    /// The table that a batch has outgrown, if it did.
+    fn outgrown(&self, shared: &Shared<'_>, pipeline: &mut SimPipeline<'_, '_>) -> Option<Table> {
+        let (candidates, contacts) = pipeline.high_water();
+        let Limits { most_candidates, most_contacts } = self.limits;
+        [
+            (Table::Interactions, candidates > most_candidates),
+            (Table::Contacts, contacts > most_contacts),
+            (Table::Letters, shared.overflow.most() > 0),
+        ]
+        .into_iter()
+        .find_map(|(table, is_outgrown)| is_outgrown.then_some(table))
     }
 
     /// Gives the blocks the homes that they were dealt to.
@@ -80,10 +92,10 @@ impl Regrouping<'_> {
         frame: u64,
         shared: &Shared<'_>,
         pipeline: &mut SimPipeline<'_, '_>,
-    ) -> Result<(), TableFull> {
+    ) {
         let due =
             self.blocking.as_deref_mut().filter(|_| world::regroups_before(Grain::Spatial, frame));
-        let Some(blocking) = due else { return Ok(()) };
+        let Some(blocking) = due else { return };
         pipeline.objects_mut().for_each(|unit| blocking.drain(&mut unit.block));
         blocking.split();
         blocking.deal(self.homes);
@@ -92,8 +104,8 @@ impl Regrouping<'_> {
             shared.register.locate(index, &unit.block);
         }
         self.settle(pipeline);
-        self.take_mail(pipeline);
-        self.post_mail(shared, pipeline)
+        self.take_mail(shared, pipeline);
+        self.post_mail(frame, shared, pipeline);
     }
 }
 
@@ -131,14 +143,13 @@ impl<'s> Context<'s, '_> {
         screen: Screen<'s>,
     ) -> (u64, End) {
         regrouping.settle(&mut pipeline);
-        if let Err(full) = regrouping.post_mail(self.shared, &pipeline) {
-            self.fail(full);
-        }
+        regrouping.post_mail(self.shared.first_frame, self.shared, &pipeline);
         let pipeline = RwLock::new(pipeline);
         let attend = |index| self.attend(index, &pipeline);
         let batches = || self.batches(frames, &pipeline, &mut regrouping, screen);
         let (done, end) = self.team.work(attend, batches);
-        regrouping.take_mail(&mut pipeline.into_inner().unwrap_or_else(PoisonError::into_inner));
+        let mut rested = pipeline.into_inner().unwrap_or_else(PoisonError::into_inner);
+        regrouping.take_mail(self.shared, &mut rested);
         (done, end)
     }
 
@@ -163,10 +174,7 @@ impl<'s> Context<'s, '_> {
             let frame = self.shared.first_frame + done;
             let batch = (FRAMES_PER_BLOCKING - frame % FRAMES_PER_BLOCKING).min(frames - done);
             let Ok(mut resting) = pipeline.write() else { break };
-            if let Err(full) = regrouping.regroup_before(frame, self.shared, &mut resting) {
-                self.fail(full);
-                break;
-            }
+            regrouping.regroup_before(frame, self.shared, &mut resting);
             if resting.run(batch as u32).is_err() {
                 break;
             }
@@ -175,8 +183,8 @@ impl<'s> Context<'s, '_> {
             screen = self.lead(&read(pipeline), &host, screen);
             done += batch;
             let Ok(mut rested) = pipeline.write() else { break };
-            if rested.high_water().1 > regrouping.most_contacts {
-                end = End::Contacts;
+            if let Some(table) = regrouping.outgrown(self.shared, &mut rested) {
+                end = End::Outgrown(table);
                 break;
             }
         }

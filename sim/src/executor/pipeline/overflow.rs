@@ -1,0 +1,75 @@
+//! Letters that the pipeline has no room for.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use dualframe_core::inbox::From;
+use dualframe_core::unit::UnitId;
+
+use super::host::Parcel;
+
+/// Letters that found the pipeline's table full, until they are due: nothing is lost while the table is too
+/// small. It is given more room after the batch.
+#[derive(Default)]
+pub(super) struct Overflow {
+    /// How many letters are waiting. Written by whoever has the lock.
+    waiting: AtomicUsize,
+    late: Mutex<Late>,
+}
+
+#[derive(Default)]
+struct Late {
+    letters: Vec<Letter>,
+    /// The most letters that waited at once.
+    most: usize,
+}
+
+struct Letter {
+    due: u64,
+    to: UnitId,
+    from: From,
+    parcel: Parcel,
+}
+
+impl Overflow {
+    /// Keeps a letter for the update of a unit in the frame `due`.
+    pub(super) fn keep(&self, due: u64, to: UnitId, from: From, parcel: Parcel) {
+        let mut late = self.lock();
+        late.letters.push(Letter { due, to, from, parcel });
+        late.most = late.most.max(late.letters.len());
+        // Relaxed, as are the others: an update comes after all updates of the frame before, in which its
+        // letters were kept, by the pipeline; none of later writes is 0 before they are taken.
+        self.waiting.store(late.letters.len(), Ordering::Relaxed);
+    }
+
+    /// Hands over the letters to a unit for its update in a frame; says whether there were any.
+    pub(super) fn deliver(&self, to: UnitId, frame: u64, take: impl FnMut((From, Parcel))) -> bool {
+        if self.waiting.load(Ordering::Relaxed) == 0 {
+            return false;
+        }
+        self.take(|letter| letter.to == to && letter.due <= frame, take)
+    }
+
+    /// Hands over all letters.
+    pub(super) fn empty(&self, take: impl FnMut((From, Parcel))) {
+        self.take(|_| true, take);
+    }
+
+    fn take(&self, is_due: impl Fn(&Letter) -> bool, take: impl FnMut((From, Parcel))) -> bool {
+        let mut late = self.lock();
+        let before = late.letters.len();
+        let due = late.letters.extract_if(.., |letter| is_due(letter));
+        due.map(|letter| (letter.from, letter.parcel)).for_each(take);
+        self.waiting.store(late.letters.len(), Ordering::Relaxed);
+        late.letters.len() < before
+    }
+
+    /// The most letters that waited at once.
+    pub(super) fn most(&self) -> usize {
+        self.lock().most
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Late> {
+        self.late.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
