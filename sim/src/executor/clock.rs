@@ -42,11 +42,6 @@ impl Clock {
         Timer { clock: self, stage, frame, began: Instant::now() }
     }
 
-    /// Counts some time towards a stage.
-    pub(super) fn add(&self, stage: Stage, time: Duration) {
-        self.nanoseconds[stage as usize].fetch_add(time.as_nanos() as u64, Ordering::Relaxed);
-    }
-
     /// What was counted, within so much time of running.
     pub(super) fn seconds(&self, running: Duration) -> StageSeconds {
         let seconds =
@@ -75,8 +70,11 @@ pub(super) struct Timer<'a> {
 impl Drop for Timer<'_> {
     fn drop(&mut self) {
         let ended = Instant::now();
-        self.clock.add(self.stage, ended - self.began);
-        if let Some((timeline, worker)) = self.clock.track.get() {
+        let Clock { nanoseconds, track } = self.clock;
+        let took = ended - self.began;
+        // Relaxed: a count of its own, which nothing else depends on.
+        nanoseconds[self.stage as usize].fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
+        if let Some((timeline, worker)) = track.get() {
             timeline.record(*worker, self.stage, self.frame, self.began, ended);
         }
     }

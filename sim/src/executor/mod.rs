@@ -190,12 +190,12 @@ pub trait Executor {
     fn into_scene(self: Box<Self>) -> Scene;
 
     /// Records on `timeline`, from the next frame on, what each worker does. Workers have the numbers
-    /// that they have in [`Executor::stage_seconds`]; only the calling thread of
-    /// [`RayonOverlappedExecutor`], which renders beside the workers, comes after them as one more. An
-    /// executor has one timeline for life, the first that it is given.
+    /// that they have in [`Executor::stage_seconds`]. An executor has one timeline for life, the first that
+    /// it is given.
     fn watch(&mut self, timeline: Arc<Timeline>);
 
-    /// What each worker spent its time on since the executor was built.
+    /// What each worker spent its time on since the executor was built. With [`RayonOverlappedExecutor`] the
+    /// calling thread, which renders beside the workers, comes after them as one more.
     fn stage_seconds(&self) -> Vec<StageSeconds>;
 }
 

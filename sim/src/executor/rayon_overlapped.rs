@@ -4,7 +4,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::clock::{Stage, StageSeconds};
+use super::clock::{Clock, Stage, StageSeconds};
 use super::engine::Engine;
 use super::parallel_for::ParallelFor;
 use super::rayon::RayonLoops;
@@ -28,7 +28,8 @@ pub struct RayonOverlappedExecutor {
     engine: Engine,
     loops: RayonLoops,
     pictures: Vec<Picture>,
-    timeline: Option<Arc<Timeline>>,
+    /// The calling thread's.
+    clock: Clock,
     running: Duration,
 }
 
@@ -47,8 +48,8 @@ impl RayonOverlappedExecutor {
         let engine = Engine::new(scene, grain, threads)?;
         let mut pictures = Vec::with_capacity(PICTURES);
         pictures.resize_with(PICTURES, || picture(&engine.world.blocks));
-        let (loops, running) = (RayonLoops::new(threads)?, Duration::ZERO);
-        Ok(Self { engine, loops, pictures, timeline: None, running })
+        let (loops, clock) = (RayonLoops::new(threads)?, Clock::default());
+        Ok(Self { engine, loops, pictures, clock, running: Duration::ZERO })
     }
 }
 
@@ -69,23 +70,17 @@ impl Executor for RayonOverlappedExecutor {
         }
         let outside = Arc::clone(&self.engine.world.outside);
         outside.begin(self.engine.frame);
-        let beside_workers = self.engine.workers.len();
         let (engine, loops) = (&mut self.engine, &self.loops);
-        let mut render_time = Duration::ZERO;
         let unused = std::thread::scope(|scope| {
             let work = move || loops.enter(|| compute(engine, loops, frames, unused, &taken_in));
             let computing = scope.spawn(work);
             // Both ends are dropped if the renderer panics, so that nobody waits for it then.
             let (used, taken_out) = (used, taken_out);
             for Taken { frame, pairs, picture } in taken_out {
-                let began = Instant::now();
+                let rendering = self.clock.time(Stage::Render, frame);
                 show(&picture, renderer);
                 renderer.swap(frame);
-                let ended = Instant::now();
-                render_time += ended - began;
-                if let Some(timeline) = &self.timeline {
-                    timeline.record(beside_workers, Stage::Render, frame, began, ended);
-                }
+                drop(rendering);
                 on_frame(&FrameRecord { frame, swapped: Instant::now(), pairs });
                 // Before its picture is given back, without which the frame after next is not computed.
                 outside.swapped(frame);
@@ -98,7 +93,6 @@ impl Executor for RayonOverlappedExecutor {
             Ok(unused) => self.pictures.extend(unused),
             Err(panic) => std::panic::resume_unwind(panic),
         }
-        self.engine.workers[0].clock.add(Stage::Render, render_time);
         self.running += began.elapsed();
         Ok(())
     }
@@ -125,11 +119,13 @@ impl Executor for RayonOverlappedExecutor {
 
     fn watch(&mut self, timeline: Arc<Timeline>) {
         self.engine.watch(&timeline);
-        self.timeline.get_or_insert(timeline);
+        self.clock.watch(timeline, self.engine.workers.len());
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {
-        self.engine.stage_seconds(self.running)
+        let mut seconds = self.engine.stage_seconds(self.running);
+        seconds.push(self.clock.seconds(self.running));
+        seconds
     }
 }
 
