@@ -111,7 +111,7 @@ impl Block {
     }
 }
 
-/// Bounding boxes in whole lanes, padded with empty ones.
+/// Bounding boxes in whole lanes, padded with what is no box.
 #[derive(Default)]
 pub(crate) struct Boxes {
     chunks: Vec<BoxLanes>,
@@ -127,8 +127,8 @@ struct BoxLanes {
 }
 
 impl BoxLanes {
-    const EMPTY: Self =
-        Self { min: [[f32::INFINITY; LANES]; 3], max: [[f32::NEG_INFINITY; LANES]; 3] };
+    /// NaNs, which no box overlaps: one without end would overlap the empty one.
+    const NONE: Self = Self { min: [[f32::NAN; LANES]; 3], max: [[f32::NAN; LANES]; 3] };
 
     /// Which boxes overlap the one from `min` to `max`.
     #[inline(always)]
@@ -147,7 +147,7 @@ impl Boxes {
     fn resize(&mut self, len: usize) {
         if self.len != len {
             self.chunks.clear();
-            self.chunks.resize(len.div_ceil(LANES), BoxLanes::EMPTY);
+            self.chunks.resize(len.div_ceil(LANES), BoxLanes::NONE);
             self.len = len;
         }
     }
@@ -264,7 +264,7 @@ mod tests {
 
     use super::*;
 
-    /// A box somewhere, or that of a solitary object, or a wall's.
+    /// A box somewhere, or that of a solitary object, or a wall's, or one without end.
     fn any_box() -> impl Strategy<Value = Bounds> {
         let place = || [-1.0_f32..1.0, -1.0..1.0, -1.0..1.0].prop_map(Vec3::from_array);
         prop_oneof![
@@ -272,6 +272,7 @@ mod tests {
                 .prop_map(|(min, size)| Bounds { min, max: min + 0.5 * size.abs() }),
             1 => Just(Bounds::EMPTY),
             1 => Just(Bounds::ALL),
+            1 => Just(Bounds { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY }),
         ]
     }
 

@@ -59,6 +59,8 @@ const BLOCKS_PER_WORKER: usize = 3;
 /// is filled again.
 pub struct Blocking {
     objects: Vec<Option<Object>>,
+    /// The numbers of those that move, as they were when they were taken over.
+    moving: Vec<u32>,
     members: Vec<Members>,
     keys: Vec<Key>,
     moving_blocks: usize,
@@ -120,7 +122,8 @@ impl Blocking {
         }
         let mut slots: Vec<Option<Object>> = Vec::new();
         slots.resize_with(count, || None);
-        for object in objects {
+        for mut object in objects {
+            object.refit();
             let id = object.id().0;
             match slots.get_mut(id as usize) {
                 Some(slot @ None) => *slot = Some(object),
@@ -157,7 +160,7 @@ impl Blocking {
         let mut blocks = Vec::new();
         blocks.resize_with(members.len(), Block::default);
         let keys = Vec::with_capacity(moving.len());
-        let mut blocking = Self { objects, members, keys, moving_blocks, share, room };
+        let mut blocking = Self { objects, moving, members, keys, moving_blocks, share, room };
         blocking.split();
         for (index, block) in blocks.iter_mut().enumerate() {
             blocking.fill(index, block);
@@ -177,8 +180,8 @@ impl Blocking {
     /// Decides, when all blocks are drained, which objects go where.
     pub fn split(&mut self) {
         self.keys.clear();
-        let moving = self.objects.iter().flatten().filter(|object| kind(object) == MOVING);
-        self.keys.extend(moving.map(Key::new));
+        let object = |&id: &u32| self.objects.get(id as usize)?.as_ref();
+        self.keys.extend(self.moving.iter().filter_map(object).map(Key::new));
         split(&mut self.keys, &mut self.members[..self.moving_blocks], self.share);
     }
 
@@ -219,11 +222,10 @@ impl Blocking {
     }
 }
 
-const MOVING: usize = 0;
-
+/// 0 for what moves, 1 for scenery, 2 for what is solitary.
 fn kind(object: &Object) -> usize {
     match (object.is_solitary(), object.is_fixed()) {
-        (false, false) => MOVING,
+        (false, false) => 0,
         (false, true) => 1,
         (true, _) => 2,
     }
@@ -310,7 +312,7 @@ mod tests {
         for (index, block) in blocks.iter_mut().enumerate() {
             blocking.fill(index, block);
             let cost = |object: &Object| (object.cost() * 1e6).round() as u64;
-            let moving = block.objects().iter().filter(|object| kind(object) == MOVING);
+            let moving = block.objects().iter().filter(|object| kind(object) == 0);
             let cost: u64 = moving.map(cost).sum();
             if cost > 0 {
                 given[blocking.home(index) as usize].push(cost);

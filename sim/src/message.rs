@@ -78,7 +78,7 @@ pub struct Letter {
 /// A message of the application's own making: the paper's base class with its *processMessage*
 /// callback.
 pub trait Custom: fmt::Debug + Send + Sync {
-    /// Changes the object as the message says. Its number and group, and whether it is solitary or fixed, stay
-    /// what they were, also if another object is put in its place.
+    /// Changes the object as the message says. Its number and group, and whether it is solitary, stay what they
+    /// were, also if another object is put in its place; what is scenery stays grouped with scenery.
     fn process(&self, object: &mut Object);
 }

@@ -210,7 +210,10 @@ impl Stages {
         let mut waits = false;
         let done = catch_unwind(AssertUnwindSafe(|| {
             for message in mail {
-                object.process(message, frame);
+                // What has been taken out stays out.
+                if object.quarantined().is_none() {
+                    object.process(message, frame);
+                }
             }
             if object.quarantined().is_none() && !object.is_fixed() {
                 // Together no object has a time of its own to measure.

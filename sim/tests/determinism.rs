@@ -7,11 +7,14 @@ use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::state_hash;
 use dualframe_sim::scene::ParticleScene;
 
-const FRAMES: u64 = 60;
+/// Regroupings and a bit.
+const FRAMES: u64 = 70;
+/// More than have a block each.
+const OBJECTS: usize = 100;
 
 #[test]
 fn executors_threads_and_grain() {
-    let scene = || particles(60, true, true);
+    let scene = || particles(OBJECTS, true, true);
     let expected = run(&mut serial(scene()), FRAMES);
     assert!(expected.0.iter().any(|count| count.collisions > 0), "nothing was tested");
     for grain in [Grain::Spatial, Grain::Pairwise] {
@@ -26,7 +29,7 @@ fn executors_threads_and_grain() {
 
 #[test]
 fn blocking_and_order_of_calls() {
-    let scene = || particles(60, true, true);
+    let scene = || particles(OBJECTS, true, true);
     let (counts, hash, _) = run(&mut serial(scene()), FRAMES);
     for size in [1, 16, 100] {
         let mut reference = Reference::new(scene(), size);
@@ -39,9 +42,9 @@ fn blocking_and_order_of_calls() {
 
 #[test]
 fn advancing_in_pieces() {
-    let mut whole = serial(particles(20, true, true));
+    let mut whole = serial(particles(OBJECTS, true, true));
     run(&mut whole, FRAMES);
-    for (name, mut pieces) in executors(|| particles(20, true, true), Grain::Spatial, 2) {
+    for (name, mut pieces) in executors(|| particles(OBJECTS, true, true), Grain::Spatial, 2) {
         for _ in 0..FRAMES / 5 {
             run(&mut *pieces, 5);
         }

@@ -11,6 +11,7 @@ use dualframe_sim::executor::Executor;
 use dualframe_sim::geometry::{Geometry, Rigid};
 use dualframe_sim::message::{Custom, Message};
 use dualframe_sim::object::{Drawing, Group, Object, ObjectId};
+use dualframe_sim::render::Renderer;
 use dualframe_sim::scene::Scene;
 use glam::{Quat, Vec3};
 use parry3d::math::Pose;
@@ -74,7 +75,7 @@ fn next_frame_by_sender_and_sequence_before_the_update() {
     expected.extend((2..4).map(|frame| (ObjectId(RECEIVER), frame, u32::MAX, 0)));
     for grain in [Grain::Spatial, Grain::Pairwise] {
         for threads in 1..=3 {
-            for index in 0..7 {
+            for index in 0..executors(|| gossip(&Log::default()), grain, 1).len() {
                 let log = Log::default();
                 let (name, mut executor) =
                     executors(|| gossip(&log), grain, threads).swap_remove(index);
@@ -173,31 +174,37 @@ fn hidden_objects_are_not_drawn() {
 
 /// Puts another object, of another number, group and kind, in the place of the receiver.
 #[derive(Debug)]
-struct Replace;
+struct Replace {
+    panics: bool,
+}
 
 impl Custom for Replace {
     fn process(&self, object: &mut Object) {
         let Geometry::Mesh(mesh) = object.geometry.clone() else { return };
         let (id, group) = (ObjectId(object.id().0 + 1), Group(9));
         *object = Object::new(id, group, Geometry::Mesh(mesh), Fixed).solitary();
+        assert!(!self.panics, "on purpose");
     }
 }
 
+/// Until blocks have been formed anew twice.
+const REGROUPED: u64 = 70;
+
 #[test]
-fn an_object_that_is_replaced_keeps_number_group_and_kind() {
-    const REPLACED: ObjectId = ObjectId(3);
+fn an_object_that_is_replaced_keeps_number_and_group() {
+    const REPLACED: [ObjectId; 2] = [ObjectId(3), ObjectId(64)];
     let mut states = Vec::new();
     for (name, mut executor) in executors(|| particles(100, true, true), Grain::Spatial, 2) {
-        executor.mailbox().post(REPLACED, Message::Custom(Box::new(Replace)));
-        // Until blocks have been formed anew twice.
-        let (_, state, _) = run(&mut *executor, 70);
+        for (replaced, panics) in REPLACED.into_iter().zip([false, true]) {
+            executor.mailbox().post(replaced, Message::Custom(Box::new(Replace { panics })));
+        }
+        let (_, state, _) = run(&mut *executor, REGROUPED);
         let mut ids = Vec::new();
         executor.visit(&mut |object| {
-            let kind = (object.group(), object.is_solitary(), object.is_fixed());
-            assert!(
-                object.id() != REPLACED || kind == (Group(0), false, false),
-                "{name}: {kind:?}"
-            );
+            if REPLACED.contains(&object.id()) {
+                assert_eq!((object.group(), object.is_solitary()), (Group(0), false), "{name}");
+                assert_eq!(object.quarantined().is_some(), object.id() == REPLACED[1], "{name}");
+            }
             ids.push(object.id());
         });
         ids.sort_unstable();
@@ -205,4 +212,59 @@ fn an_object_that_is_replaced_keeps_number_group_and_kind() {
         states.push(state);
     }
     assert!(states.iter().all(|state| *state == states[0]), "{states:x?}");
+}
+
+/// Gives the receiver a behaviour that moves it.
+#[derive(Debug)]
+struct Loosen;
+
+impl Custom for Loosen {
+    fn process(&self, object: &mut Object) {
+        object.behavior = Box::new(common::springs(1.0));
+    }
+}
+
+#[test]
+fn scenery_that_is_given_a_behavior_moves() {
+    // The first before there is an executor, the second by a message; the third stays.
+    let scene = || {
+        let mut stages = no_rules();
+        stages.gravity = Vec3::NEG_Y * 24.0;
+        let mut objects: Vec<_> = (0..3).map(|id| point(id, Fixed)).collect();
+        objects[0].behavior = Box::new(common::springs(1.0));
+        Scene::new(objects, stages)
+    };
+    for (name, mut executor) in executors(scene, Grain::Spatial, 2) {
+        executor.mailbox().post(ObjectId(1), Message::Custom(Box::new(Loosen)));
+        run(&mut *executor, REGROUPED);
+        let falls = [0, 1, 2].map(|id| velocity(&*executor, id).y < -1.0);
+        assert_eq!(falls, [true, true, false], "{name}");
+    }
+}
+
+/// What a renderer may ask of objects.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Seen(Vec<(ObjectId, Group, [bool; 2])>);
+
+impl Renderer for Seen {
+    fn draw(&mut self, object: &Object) {
+        let kind = [object.is_solitary(), object.is_fixed()];
+        self.0.push((object.id(), object.group(), kind));
+    }
+
+    fn swap(&mut self, _: u64) {
+        self.0.sort_unstable();
+    }
+}
+
+#[test]
+fn renderers_see_the_same_objects() {
+    let mut expected = None;
+    for (name, mut executor) in executors(|| particles(100, true, true), Grain::Spatial, 2) {
+        let replace = Message::Custom(Box::new(Replace { panics: false }));
+        executor.mailbox().post(ObjectId(3), replace);
+        let mut seen = Seen::default();
+        executor.advance(2, &mut seen, &mut |_| ()).expect("no table is full");
+        assert_eq!(expected.get_or_insert_with(|| seen.clone()), &seen, "{name}");
+    }
 }

@@ -20,7 +20,8 @@ const NATIVE: [ExecutorKind; 4] = [
     ExecutorKind::TbbFor,
     ExecutorKind::TbbPipeline,
 ];
-const PARTICLES: usize = 60;
+/// More than have a block each.
+const PARTICLES: usize = 100;
 
 fn manager(executor: ExecutorKind, threads: usize) -> VeManager {
     let settings = Settings { executor, threads, grain: Grain::Spatial, ..Settings::default() };

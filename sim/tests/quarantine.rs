@@ -2,23 +2,29 @@
 
 mod common;
 
+use std::fmt;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use common::{Acting, executors, hash_without, no_rules, particles, point, run, serial};
 use dualframe_sim::behavior::{Fixed, Input};
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::Executor;
-use dualframe_sim::geometry::Geometry;
+use dualframe_sim::geometry::{Geometry, Mesh, Rigid, Topology};
 use dualframe_sim::interaction::{
     Detection, InteractionPair, NodeSpheres, Penalty, Rules, Touches,
 };
-use dualframe_sim::message::Message;
+use dualframe_sim::message::{Custom, Message};
 use dualframe_sim::object::{FaultKind, Group, Object, ObjectId};
 use dualframe_sim::scene::Scene;
-use glam::Vec3;
+use glam::{Quat, Vec3};
+use parry3d::math::Pose;
+use parry3d::shape::SharedShape;
 
+/// More than have a block each.
+const CROWD: usize = 100;
 /// The particle that misbehaves, on its way to the crowd of the others.
-const CULPRIT: ObjectId = ObjectId(29);
+const CULPRIT: ObjectId = ObjectId(CROWD as u32 - 1);
 /// When it does: before it touches anybody.
 const FATAL_FRAME: u64 = 7;
 const FRAMES: u64 = 100;
@@ -26,8 +32,8 @@ const FRAMES: u64 = 100;
 /// Particles without walls; the culprit, apart from the others and flying at them, is itself but for
 /// what `worst` does to it in the fatal frame.
 fn crowd(worst: fn(&mut Geometry)) -> Scene {
-    let mut scene = particles(30, false, true);
-    scene.objects.truncate(30);
+    let mut scene = particles(CROWD, false, true);
+    scene.objects.truncate(CROWD);
     let culprit = &mut scene.objects[CULPRIT.0 as usize];
     let mesh = culprit.geometry.as_mesh_mut().expect("a particle is a mesh");
     let away = Vec3::X * 0.9 - mesh.center();
@@ -72,7 +78,7 @@ fn only_the_culprit_goes(worst: fn(&mut Geometry), kind: FaultKind) {
             let (_, _, renderer) = run(&mut *executor, FRAMES);
             assert_eq!(quarantined(&*executor), [(CULPRIT, kind, FATAL_FRAME)], "{name}");
             assert_eq!(hash_without(&*executor, CULPRIT), expected, "{name}");
-            assert_eq!(renderer.draws(), 29 * FRAMES + FATAL_FRAME, "{name}");
+            assert_eq!(renderer.draws(), (CROWD as u64 - 1) * FRAMES + FATAL_FRAME, "{name}");
         }
     }
 }
@@ -172,5 +178,96 @@ fn a_panic_in_an_interaction_takes_both() {
         assert_eq!(quarantined(&*executor), both, "{name}");
         let candidates: Vec<u64> = counts.iter().map(|count| count.candidates).collect();
         assert_eq!(candidates, [3, 0], "{name}");
+    }
+}
+
+fn rest(_: &mut Geometry, _: &mut Input<'_>) {}
+
+/// Puts an object like the receiver in its place.
+#[derive(Debug)]
+struct Revive;
+
+impl Custom for Revive {
+    fn process(&self, object: &mut Object) {
+        let (id, group, geometry) = (object.id(), object.group(), object.geometry.clone());
+        *object = Object::new(id, group, geometry, common::springs(1.0));
+    }
+}
+
+#[test]
+fn who_has_left_does_not_come_back() {
+    for (name, mut executor) in executors(|| crowd(|_| {}), Grain::Spatial, 2) {
+        for message in [Message::Remove, Message::Custom(Box::new(Revive))] {
+            executor.mailbox().post(CULPRIT, message);
+        }
+        run(&mut *executor, 2);
+        assert_eq!(quarantined(&*executor), [(CULPRIT, FaultKind::Removed, 0)], "{name}");
+    }
+}
+
+#[test]
+fn a_box_that_is_no_box_harms_nobody() {
+    // Finite numbers of which no box can be made, and others that are not finite from the start.
+    let mut huge = Pose::identity();
+    huge.rotation = Quat::from_xyzw(1e30, 1e30, 1e30, 1e30);
+    for pose in [huge, Pose::from_translation(Vec3::NAN), Pose::from_translation(Vec3::X * 3e38)] {
+        let scene = |with: bool| {
+            let mut scene = particles(CROWD, true, true);
+            let rigid = Rigid::new(SharedShape::cuboid(1e38, 0.1, 0.1), pose);
+            let id = ObjectId(scene.objects.len() as u32);
+            let object = Object::new(id, Group(1), Geometry::Rigid(rigid), Acting(rest));
+            scene.objects.push(if with { object } else { object.solitary() });
+            scene
+        };
+        let mut alone = serial(scene(false));
+        let expected = run(&mut alone, FRAMES).0;
+        for grain in [Grain::Spatial, Grain::Pairwise] {
+            for (name, mut executor) in executors(|| scene(true), grain, 2) {
+                assert_eq!(run(&mut *executor, FRAMES).0, expected, "{name}, {grain:?}, {pose:?}");
+                let gone = [(ObjectId(106), FaultKind::NonFinite, 0)];
+                assert_eq!(quarantined(&*executor), gone, "{name}, {grain:?}, {pose:?}");
+            }
+        }
+    }
+}
+
+/// Gives the receiver a geometry.
+struct Fill(Geometry);
+
+impl fmt::Debug for Fill {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Fill")
+    }
+}
+
+impl Custom for Fill {
+    fn process(&self, object: &mut Object) {
+        object.geometry = self.0.clone();
+    }
+}
+
+#[test]
+fn an_empty_box_may_be_filled() {
+    let scene = || {
+        let mut scene = particles(3, true, true);
+        let nothing = Topology::new(&[], Vec::new(), &[], false).expect("no nodes");
+        let mesh = Mesh::new(Arc::new(nothing), &[], &[], 0.1).expect("no masses");
+        let id = ObjectId(scene.objects.len() as u32);
+        scene.objects.push(Object::new(id, Group(0), Geometry::Mesh(mesh), Acting(rest)));
+        scene
+    };
+    let mut expected = None;
+    for grain in [Grain::Spatial, Grain::Pairwise] {
+        for (name, mut executor) in executors(scene, grain, 2) {
+            let fill = Fill(scene().objects[0].geometry.clone());
+            executor.mailbox().post(ObjectId(9), Message::Custom(Box::new(fill)));
+            let (counts, ..) = run(&mut *executor, 3);
+            assert!(counts[2].candidates > counts[0].candidates, "{name}, {grain:?}: {counts:?}");
+            assert_eq!(
+                expected.get_or_insert_with(|| counts.clone()),
+                &counts,
+                "{name}, {grain:?}"
+            );
+        }
     }
 }

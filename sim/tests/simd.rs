@@ -62,7 +62,7 @@ fn available() -> Vec<Simd> {
 #[test]
 fn whole_scenes() {
     let states = available().into_iter().map(|simd| {
-        let mut scene = particles(60, true, true);
+        let mut scene = particles(100, true, true);
         scene.stages.simd = simd;
         run(&mut serial(scene), 120)
     });
@@ -183,6 +183,40 @@ fn bodies_beside_others() {
                     let name = simd.instructions().name();
                     assert_eq!(bits(object), *expected, "{name}, {size} a block, seed {seed}");
                 }
+            }
+        }
+    }
+}
+
+#[test]
+fn bodies_beside_others_far_away_and_fast() {
+    // What dashpots to the centre would do to padding, which is at the origin, is beyond what numbers hold.
+    for (place, speed) in [(1e19, 1e20), (1e17, 1e23), (1e10, 1e30), (1e-20, 1e-30), (1e30, 1e15)] {
+        let thrown = || {
+            let mut objects = bodies(3, 40);
+            for object in &mut objects {
+                let mesh = object.geometry.as_mesh_mut().expect("a body");
+                for node in 0..mesh.positions.len() {
+                    mesh.positions.add(node, Vec3::X * place);
+                }
+                mesh.set_velocity(Vec3::new(1.0, -0.5, 0.25) * speed);
+            }
+            objects
+        };
+        let state = |object: &Object| match object.quarantined() {
+            Some(fault) => Err(fault),
+            None => Ok(bits(object)),
+        };
+        let expected: Vec<_> =
+            outcome(thrown(), stages(Simd::detect()), 1).iter().map(state).collect();
+        for simd in available() {
+            for size in [1, 40] {
+                let objects = outcome(thrown(), stages(simd), size);
+                let name = simd.instructions().name();
+                assert!(
+                    objects.iter().map(state).eq(expected.iter().cloned()),
+                    "{name}, {size}, {place}"
+                );
             }
         }
     }

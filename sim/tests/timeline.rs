@@ -35,7 +35,7 @@ fn all_spans(timeline: &Timeline) -> Vec<Vec<Span>> {
 
 fn pipeline(entry: Entry, threads: usize) -> PipelineExecutor {
     let pool = Arc::new(Pool::new(threads, false));
-    let scene = particles(60, true, true);
+    let scene = particles(100, true, true);
     PipelineExecutor::new(scene, Grain::Spatial, entry, pool).expect("the scene is well formed")
 }
 
@@ -48,7 +48,7 @@ fn watched(executor: &mut dyn Executor, frames: u64) -> Arc<Timeline> {
 
 #[test]
 fn every_frame_shows_every_stage() {
-    for (name, mut executor) in executors(|| particles(60, true, true), Grain::Spatial, THREADS) {
+    for (name, mut executor) in executors(|| particles(100, true, true), Grain::Spatial, THREADS) {
         run(&mut *executor, UNSEEN);
         let timeline = watched(&mut *executor, 5);
         run(&mut *executor, FRAMES - UNSEEN - 5);
@@ -103,7 +103,7 @@ fn two_frames_in_flight_are_visible() {
 
 #[test]
 fn results_are_the_same() {
-    let scene = || particles(60, true, true);
+    let scene = || particles(100, true, true);
     let alone = executors(scene, Grain::Spatial, THREADS);
     let watched = executors(scene, Grain::Spatial, THREADS);
     for ((name, mut alone), (_, mut watched)) in alone.into_iter().zip(watched) {

@@ -50,8 +50,9 @@ impl Springs {
     /// Advances positions and velocities by the frame.
     ///
     /// # Panics
-    /// The mesh has fewer positions or velocities than its topology has nodes.
+    /// The mesh has more or fewer positions or velocities than its topology has nodes.
     pub fn advance(self, mesh: &mut Mesh, input: &mut Input<'_>) {
+        assert!(mesh.is_whole(), "a position and a velocity for each node");
         batch::advance_alone(mesh, self, &mut input.springs.alone, input.simd);
     }
 }
@@ -247,7 +248,9 @@ fn pull_to_center<I: Isa, L: Law<I>>(
     for chunk in 0..chunks {
         let way = minus(isa, center, load(isa, &positions[chunk].0));
         let relative = if L::NEEDS_VELOCITY {
-            minus(isa, center_velocity, load(isa, &velocities[chunk].0))
+            // The padding is at rest: what the centre's velocity would do there may be infinite.
+            let present = isa.load(&present[chunk]);
+            times(isa, minus(isa, center_velocity, load(isa, &velocities[chunk].0)), present)
         } else {
             way
         };

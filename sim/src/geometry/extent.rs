@@ -16,8 +16,16 @@ pub struct Extent {
     /// The middle of it, in metres: the mean of a surface's nodes, a rigid shape's origin, a volume's
     /// middle.
     pub center: Vec3,
-    /// Whether every number in it that changes is finite.
+    /// Whether every number in it that changes is finite, and the box, unless it is empty.
     pub finite: bool,
+}
+
+impl Extent {
+    /// Of a geometry whose numbers are finite or not. Finite numbers may still be too large for a box.
+    pub(super) fn new(bounds: Bounds, center: Vec3, finite: bool) -> Self {
+        let boxed = bounds.is_finite() || bounds == Bounds::EMPTY;
+        Self { bounds, center, finite: finite && boxed }
+    }
 }
 
 /// Zeros, and after them what hides a lane of padding from a search for the least number.

@@ -23,13 +23,21 @@ pub enum MeshError {
         /// The number of nodes.
         nodes: usize,
     },
-    /// A mass is negative or not finite.
-    #[error("the mass of node {node} is {mass} kg; it must be finite and not negative")]
+    /// A mass is negative or not finite, or so small that its inverse is not finite.
+    #[error(
+        "the mass of node {node} is {mass} kg; it and its inverse must be finite and not negative"
+    )]
     Mass {
         /// The node.
         node: usize,
         /// Its mass, in kilograms.
         mass: f32,
+    },
+    /// The contact radius is negative or not finite.
+    #[error("the contact radius is {radius} m; it must be finite and not negative")]
+    Radius {
+        /// The radius, in metres.
+        radius: f32,
     },
 }
 
@@ -63,8 +71,8 @@ impl Mesh {
     /// node carries.
     ///
     /// # Errors
-    /// Lists of another length than the topology's number of nodes; a mass that is negative or not
-    /// finite.
+    /// Lists of another length than the topology's number of nodes; a mass or radius that is negative or not
+    /// finite, or a mass that is less than 1/[`f32::MAX`] and not 0.
     pub fn new(
         topology: Arc<Topology>,
         positions: &[Vec3],
@@ -73,11 +81,15 @@ impl Mesh {
     ) -> Result<Self, MeshError> {
         let nodes = topology.nodes();
         check_length("masses", masses.len(), nodes)?;
-        let wrong = |&(_, &mass): &(usize, &f32)| !(mass >= 0.0 && mass.is_finite());
+        let is_right = |value: f32| value >= 0.0 && value.is_finite();
+        let inverse = |&mass: &f32| if mass > 0.0 { 1.0 / mass } else { 0.0 };
+        let wrong = |&(_, mass): &(usize, &f32)| !(is_right(*mass) && inverse(mass).is_finite());
         if let Some((node, &mass)) = masses.iter().enumerate().find(wrong) {
             return Err(MeshError::Mass { node, mass });
         }
-        let inverse = |&mass: &f32| if mass > 0.0 { 1.0 / mass } else { 0.0 };
+        if !is_right(contact_radius) {
+            return Err(MeshError::Radius { radius: contact_radius });
+        }
         let masses = Masses {
             inverse: in_lanes(masses.iter().map(inverse), nodes),
             masses: in_lanes(masses.iter().copied(), nodes),
@@ -232,4 +244,29 @@ pub(crate) struct KernelParts<'a> {
     pub(crate) velocities: &'a mut Vectors,
     pub(crate) masses: &'a [Lanes],
     pub(crate) inverse_masses: &'a [Lanes],
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mesh(mass: f32, contact_radius: f32) -> Result<Mesh, MeshError> {
+        let topology = Topology::new(&[Vec3::ZERO], Vec::new(), &[], false).expect("a node");
+        Mesh::new(Arc::new(topology), &[Vec3::ZERO], &[mass], contact_radius)
+    }
+
+    #[test]
+    fn masses_and_radii_that_cannot_be() {
+        for value in [-1.0, f32::NAN, f32::INFINITY] {
+            assert!(matches!(mesh(value, 1.0), Err(MeshError::Mass { node: 0, .. })), "{value}");
+            assert!(matches!(mesh(1.0, value), Err(MeshError::Radius { .. })), "{value}");
+        }
+        assert!(
+            matches!(mesh(1e-39, 1.0), Err(MeshError::Mass { node: 0, .. })),
+            "1/m is infinite"
+        );
+        for (mass, radius) in [(0.0, 0.0), (1e-38, 1.0), (f32::MAX, f32::MAX)] {
+            assert!(mesh(mass, radius).is_ok(), "{mass} kg, {radius} m");
+        }
+    }
 }

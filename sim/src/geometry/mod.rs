@@ -94,16 +94,13 @@ impl Geometry {
     pub fn extent(&self, simd: Simd) -> Extent {
         match self {
             Self::Mesh(mesh) => mesh.extent(simd),
-            Self::Rigid(rigid) => Extent {
-                bounds: rigid.bounds(),
-                center: rigid.pose.translation,
-                finite: rigid.is_finite(),
-            },
-            Self::Volume(volume) => Extent {
-                bounds: volume.bounds().inflated(volume.margin),
-                center: volume.center(),
-                finite: volume.is_finite(),
-            },
+            Self::Rigid(rigid) => {
+                Extent::new(rigid.bounds(), rigid.pose.translation, rigid.is_finite())
+            }
+            Self::Volume(volume) => {
+                let bounds = volume.bounds().inflated(volume.margin);
+                Extent::new(bounds, volume.center(), volume.is_finite())
+            }
         }
     }
 }

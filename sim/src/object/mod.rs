@@ -72,21 +72,22 @@ impl Object {
         geometry: Geometry,
         behavior: impl Behavior + 'static,
     ) -> Self {
-        let Extent { bounds, center, .. } = geometry.extent(Simd::detect());
-        Self {
+        let mut object = Self {
             id,
             group,
             solitary: false,
             fixed: behavior.is_fixed(),
             quarantined: None,
-            bounds,
-            center,
+            bounds: Bounds::EMPTY,
+            center: Vec3::ZERO,
             cost: 0.0,
             visual: VisualProperties::default(),
             drawing: Drawing::default(),
             geometry,
             behavior: Box::new(behavior),
-        }
+        };
+        object.refit();
+        object
     }
 
     /// The same object without interactions: it goes straight to update and render (§5.1, §9).
@@ -164,15 +165,19 @@ impl Object {
         self.bounds = Bounds::EMPTY;
     }
 
-    /// Fits box and centre to a geometry that was changed from outside. Within an environment that is
-    /// done after every update.
+    /// Fits box and centre to a geometry that was changed from outside, and takes the object for scenery or not by
+    /// its behaviour. That is done where an executor takes over a scene; within an environment box and centre
+    /// are fitted after every update.
     pub fn refit(&mut self) {
+        self.fixed = self.behavior.is_fixed();
         self.fit(self.geometry.extent(Simd::detect()));
     }
 
-    fn fit(&mut self, Extent { bounds, center, .. }: Extent) {
+    fn fit(&mut self, Extent { bounds, center, finite }: Extent) {
         if self.quarantined.is_none() {
-            (self.bounds, self.center) = (bounds, center);
+            // In a union a box of no meaning would make others of those before it.
+            self.bounds = if finite { bounds } else { Bounds::EMPTY };
+            self.center = center;
         }
     }
 
@@ -195,12 +200,7 @@ impl Object {
                 }
             }
             Message::Remove => self.quarantine(Fault { kind: FaultKind::Removed, frame }),
-            Message::Custom(custom) => {
-                let Self { id, group, solitary, fixed, .. } = *self;
-                custom.process(self);
-                // By these it is found and grouped, also if another was put in its place.
-                (self.id, self.group, self.solitary, self.fixed) = (id, group, solitary, fixed);
-            }
+            Message::Custom(custom) => custom.process(Replaceable::from(self).object),
             Message::Stiffness { .. }
             | Message::Damping(_)
             | Message::Pull { .. }
@@ -220,7 +220,7 @@ impl Object {
             id: self.id,
             group: self.group,
             solitary: self.solitary,
-            fixed: true,
+            fixed: self.fixed,
             quarantined: self.quarantined,
             bounds: self.bounds,
             center: self.center,
@@ -238,6 +238,8 @@ impl Object {
         snapshot.id = self.id;
         snapshot.group = self.group;
         snapshot.solitary = self.solitary;
+        snapshot.fixed = self.fixed;
+        snapshot.cost = self.cost;
         snapshot.quarantined = self.quarantined;
         snapshot.bounds = self.bounds;
         snapshot.center = self.center;
@@ -249,5 +251,29 @@ impl Object {
             (from, to) => to.clone_from(from),
         }
         self.behavior.show_in(&mut snapshot.behavior);
+    }
+}
+
+/// An object that another may be put in the place of, also by who panics then.
+struct Replaceable<'o> {
+    object: &'o mut Object,
+    id: ObjectId,
+    group: Group,
+    solitary: bool,
+}
+
+impl<'o> From<&'o mut Object> for Replaceable<'o> {
+    fn from(object: &'o mut Object) -> Self {
+        let Object { id, group, solitary, .. } = *object;
+        Self { object, id, group, solitary }
+    }
+}
+
+impl Drop for Replaceable<'_> {
+    fn drop(&mut self) {
+        let object = &mut *self.object;
+        // By these it is found, grouped and let past interactions.
+        (object.id, object.group, object.solitary) = (self.id, self.group, self.solitary);
+        object.fixed = object.behavior.is_fixed();
     }
 }

@@ -174,7 +174,10 @@ pub(super) fn modelled_interactions(
     let mut interactions = Vec::new();
     for (first, a) in blocks.iter().enumerate() {
         for (second, b) in blocks.iter().enumerate().skip(first + 1) {
-            if stages.rules.apply(a.groups(), b.groups()) {
+            // Whatever their boxes: an empty one may be filled.
+            let interact = |[a, b]: [&Object; 2]| stages.rules.interact(a, b);
+            let mut ends = a.objects().iter().flat_map(|a| b.objects().iter().map(move |b| [a, b]));
+            if ends.any(interact) {
                 let ends = [first, second].map(|index| UnitId(index as u32));
                 interactions.push(InteractionSlot::between(ends[0], ends[1], Found::default()));
             }
