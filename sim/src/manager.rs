@@ -53,6 +53,8 @@ pub struct VeManager {
     executor: Box<dyn Executor>,
     pool: Arc<Pool>,
     settings: Settings,
+    /// Whether a run has begun and not ended.
+    running: bool,
 }
 
 impl VeManager {
@@ -89,20 +91,29 @@ impl VeManager {
             #[cfg(feature = "native-peers")]
             ExecutorKind::TbbPipeline => Box::new(TbbPipelineExecutor::new(scene, grain, threads)?),
         };
-        Ok(Self { executor, pool, settings })
+        Ok(Self { executor, pool, settings, running: false })
     }
 
     /// Advances by `frames` frames; see [`Executor::advance`].
     ///
     /// # Errors
-    /// A table of the pipeline's is full: the environment cannot go on.
+    /// Those of [`Executor::advance`]; [`ExecutorError::BrokenOff`] after a run that panicked.
+    ///
+    /// # Panics
+    /// If the renderer or `on_frame` does.
     pub fn run(
         &mut self,
         frames: u64,
         renderer: &mut dyn Renderer,
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<(), ExecutorError> {
-        self.executor.advance(frames, renderer, on_frame)
+        if self.running {
+            return Err(ExecutorError::BrokenOff);
+        }
+        self.running = true;
+        let done = self.executor.advance(frames, renderer, on_frame);
+        self.running = false;
+        done
     }
 
     /// How the environment is run, with as many threads as there are now.

@@ -4,6 +4,7 @@
 
 use std::hash::Hasher;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 
 use dualframe_sim::behavior::{Behavior, Input};
 use dualframe_sim::blocking::Grain;
@@ -183,20 +184,69 @@ fn nothing_at_all() {
 }
 
 #[test]
-fn a_renderer_that_panics_takes_no_object_along() {
+fn a_renderer_that_panics_takes_nothing_along() {
+    const LAST: u64 = 40;
     for &executor in ExecutorKind::ALL {
         let settings = Settings { executor, threads: 2, ..Settings::default() };
-        let mut manager = VeManager::new(scene(100), settings).expect("valid settings");
-        let objects = |manager: &VeManager| {
-            let mut count = 0;
-            manager.visit(&mut |_| count += 1);
-            count
+        let mut manager = VeManager::new(talkative(100, 1), settings).expect("valid settings");
+        let mut run = |frames, last| {
+            catch_unwind(AssertUnwindSafe(|| {
+                manager.run(frames, &mut NullRenderer::new(), &mut |record| {
+                    assert_ne!(record.frame, last, "on purpose");
+                })
+            }))
         };
-        let all = objects(&manager);
+        assert!(matches!(run(1, LAST), Ok(Ok(()))), "{executor:?}");
+        assert!(run(100, LAST).is_err(), "{executor:?}");
+        assert!(matches!(run(1, u64::MAX), Ok(Err(ExecutorError::BrokenOff))), "{executor:?}");
+        assert_eq!(manager.frame(), LAST, "{executor:?}");
+        let scene = manager.into_scene();
+        assert!(scene.objects.iter().map(Object::id).eq((0..106).map(ObjectId)), "{executor:?}");
+        assert!(!scene.mail.is_empty(), "{executor:?}: letters are lost");
+    }
+}
+
+/// Lives as long as its environment.
+struct Alive(#[expect(dead_code)] Arc<()>);
+
+impl Behavior for Alive {
+    fn update(&mut self, _: &mut Geometry, _: &mut Input<'_>) {}
+}
+
+#[test]
+fn an_environment_ends_with_its_executor_also_in_a_panic() {
+    for &executor in ExecutorKind::ALL {
+        let alive = Arc::new(());
         let ended = catch_unwind(AssertUnwindSafe(|| {
+            let mut scene = scene(100);
+            scene.objects[7].behavior = Box::new(Alive(Arc::clone(&alive)));
+            let settings = Settings { executor, threads: 3, ..Settings::default() };
+            let mut manager = VeManager::new(scene, settings).expect("valid settings");
             manager.run(3, &mut NullRenderer::new(), &mut |record| assert_eq!(record.frame, 0))
         }));
         assert!(ended.is_err(), "{executor:?}");
-        assert_eq!(objects(&manager), all, "{executor:?}");
+        assert_eq!(Arc::strong_count(&alive), 1, "{executor:?}: nobody has it any more");
     }
+}
+
+#[test]
+fn frames_without_end() {
+    for &executor in ExecutorKind::ALL {
+        let settings = Settings { executor, threads: 2, ..Settings::default() };
+        let mut scene = scene(3);
+        scene.frame = 5;
+        let mut manager = VeManager::new(scene, settings).expect("valid settings");
+        let ended = catch_unwind(AssertUnwindSafe(|| {
+            manager.run(u64::MAX, &mut NullRenderer::new(), &mut |record| assert!(record.frame < 9))
+        }));
+        assert!(ended.is_err(), "{executor:?}: it went on until it was stopped");
+    }
+}
+
+#[test]
+fn a_manager_may_be_run_on_another_thread() {
+    let mut manager = VeManager::new(scene(3), Settings::default()).expect("valid settings");
+    let run = move || manager.run(3, &mut NullRenderer::new(), &mut |_| ()).map(|()| manager);
+    let manager = std::thread::spawn(run).join().expect("no panic").expect("no table is full");
+    assert_eq!(manager.frame(), 3);
 }

@@ -1,8 +1,8 @@
 //! A barrier that spins for a moment and then sleeps.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
-use std::thread::available_parallelism;
+use std::thread::{self, available_parallelism};
 
 /// How often a thread looks before it goes to sleep: some tens of microseconds, about a stage's tail; on
 /// processors that take long to pause, up to 200.
@@ -15,6 +15,7 @@ pub(super) struct Barrier {
     spins: u32,
     arrived: AtomicUsize,
     generation: AtomicUsize,
+    broken: AtomicBool,
     sleep: Mutex<()>,
     woken: Condvar,
 }
@@ -28,6 +29,7 @@ impl Barrier {
             spins: if threads > processors { 0 } else { SPINS },
             arrived: AtomicUsize::new(0),
             generation: AtomicUsize::new(0),
+            broken: AtomicBool::new(false),
             sleep: Mutex::new(()),
             woken: Condvar::new(),
         }
@@ -46,18 +48,48 @@ impl Barrier {
     }
 
     /// Waits until all threads are here.
+    ///
+    /// # Panics
+    /// The barrier is broken: somebody will never be here.
     pub(super) fn wait(&self) {
         let generation = self.generation.load(Ordering::Acquire);
+        let waits = || self.generation.load(Ordering::Acquire) == generation && !self.is_broken();
         self.arrive();
-        for _ in 0..self.spins {
-            if self.generation.load(Ordering::Acquire) != generation {
-                return;
-            }
+        let mut spins = self.spins;
+        while waits() && spins > 0 {
+            spins -= 1;
             std::hint::spin_loop();
         }
-        let mut guard = self.sleep.lock().unwrap_or_else(PoisonError::into_inner);
-        while self.generation.load(Ordering::Acquire) == generation {
-            guard = self.woken.wait(guard).unwrap_or_else(PoisonError::into_inner);
+        if waits() {
+            let mut guard = self.sleep.lock().unwrap_or_else(PoisonError::into_inner);
+            while waits() {
+                guard = self.woken.wait(guard).unwrap_or_else(PoisonError::into_inner);
+            }
+        }
+        assert!(!self.is_broken(), "another thread has panicked");
+    }
+
+    /// Lets everybody who waits, now or later, panic.
+    pub(super) fn break_off(&self) {
+        // Under the lock, as in `arrive`. Release: with the Acquire in `is_broken`; nothing else is read by it.
+        let guard = self.sleep.lock().unwrap_or_else(PoisonError::into_inner);
+        self.broken.store(true, Ordering::Release);
+        drop(guard);
+        self.woken.notify_all();
+    }
+
+    pub(super) fn is_broken(&self) -> bool {
+        self.broken.load(Ordering::Acquire)
+    }
+}
+
+/// Breaks a barrier if this thread panics: the others would wait for it.
+pub(super) struct OnPanic<'b>(pub(super) &'b Barrier);
+
+impl Drop for OnPanic<'_> {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            self.0.break_off();
         }
     }
 }
@@ -65,6 +97,22 @@ impl Barrier {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nobody_waits_for_who_has_panicked() {
+        let barrier = Barrier::new(3);
+        thread::scope(|scope| {
+            let waits = || scope.spawn(|| barrier.wait());
+            let waiting = [waits(), waits()];
+            let panics = scope.spawn(|| {
+                let _guard = OnPanic(&barrier);
+                panic!("on purpose");
+            });
+            assert!(panics.join().is_err());
+            assert!(waiting.into_iter().all(|thread| thread.join().is_err()));
+        });
+        assert!(barrier.is_broken());
+    }
 
     #[test]
     fn nobody_passes_before_the_last_arrives() {

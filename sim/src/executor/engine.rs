@@ -96,7 +96,8 @@ impl Engine {
         })
     }
 
-    /// Computes the next frame. `updated` is shown each block right after its update.
+    /// Computes the frame [`Self::frame`], which is then to be counted. `updated` is shown each block right
+    /// after its update.
     pub(super) fn compute(
         &mut self,
         loops: &impl ParallelFor,
@@ -109,7 +110,6 @@ impl Engine {
         self.broad_phase(loops);
         let pairs = self.interact(loops);
         self.update(loops, updated);
-        self.frame += 1;
         pairs
     }
 

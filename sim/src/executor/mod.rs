@@ -131,6 +131,9 @@ pub enum ExecutorError {
     /// The pipeline's table of blocks that meet is full.
     #[error(transparent)]
     Table(#[from] dualframe_core::error::TableFull),
+    /// A renderer, or who was told of a frame, panicked in an earlier run.
+    #[error("a run was broken off by a panic; its objects are of different frames")]
+    BrokenOff,
     /// Rayon's pool could not be built.
     #[error("the thread pool could not be started")]
     Pool(#[from] ::rayon::ThreadPoolBuildError),
@@ -151,7 +154,7 @@ pub struct FrameRecord {
 }
 
 /// Something that advances an environment frame by frame.
-pub trait Executor {
+pub trait Executor: Send {
     /// Advances by `frames` frames. Every frame's objects go to the renderer, then the frame is
     /// swapped and `on_frame` is told, in the order of the frames; when this returns, all of them are
     /// swapped. The renderer is called by the calling thread only.
@@ -163,8 +166,8 @@ pub trait Executor {
     /// pipeline's pool was enlarged and the threads cannot be had; frames before that are done, and it can go on.
     ///
     /// # Panics
-    /// If the renderer or `on_frame` does. The objects are still there, some of them a frame ahead of others:
-    /// they can be looked at, but not be advanced any more as if nothing had happened.
+    /// If the renderer or `on_frame` does. The objects are still there, some of them a frame or two ahead of
+    /// others: they can be looked at, but must not be advanced any more as if nothing had happened.
     fn advance(
         &mut self,
         frames: u64,

@@ -15,7 +15,7 @@ use crate::stages::Stages;
 use crate::timeline::Timeline;
 
 /// Parallel loops on a fixed number of threads.
-pub trait ParallelFor: Sized + Sync {
+pub trait ParallelFor: Sized + Send + Sync {
     /// Loops on so many threads, at least 1.
     ///
     /// # Errors
@@ -81,6 +81,7 @@ impl<P: ParallelFor> Executor for LoopExecutor<P> {
             }
             on_frame(&FrameRecord { frame, swapped: Instant::now(), pairs });
             self.engine.world.outside.swapped(frame);
+            self.engine.frame += 1;
         }
         self.running += began.elapsed();
         Ok(())

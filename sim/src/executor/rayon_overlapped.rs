@@ -28,6 +28,8 @@ pub struct RayonOverlappedExecutor {
     engine: Engine,
     loops: RayonLoops,
     pictures: Vec<Picture>,
+    /// The frame to be shown next: the engine is ahead while it runs.
+    frame: u64,
     /// The calling thread's.
     clock: Clock,
     running: Duration,
@@ -48,8 +50,9 @@ impl RayonOverlappedExecutor {
         let engine = Engine::new(scene, grain, threads)?;
         let mut pictures = Vec::with_capacity(PICTURES);
         pictures.resize_with(PICTURES, || picture(&engine.world.blocks));
+        let frame = engine.frame;
         let (loops, clock) = (RayonLoops::new(threads)?, Clock::default());
-        Ok(Self { engine, loops, pictures, clock, running: Duration::ZERO })
+        Ok(Self { engine, loops, pictures, frame, clock, running: Duration::ZERO })
     }
 }
 
@@ -84,6 +87,7 @@ impl Executor for RayonOverlappedExecutor {
                 on_frame(&FrameRecord { frame, swapped: Instant::now(), pairs });
                 // Before its picture is given back, without which the frame after next is not computed.
                 outside.swapped(frame);
+                self.frame = frame + 1;
                 give_back(&used, picture);
             }
             drop(used);
@@ -98,7 +102,7 @@ impl Executor for RayonOverlappedExecutor {
     }
 
     fn frame(&self) -> u64 {
-        self.engine.frame
+        self.frame
     }
 
     fn visit(&self, visit: &mut dyn FnMut(&Object)) {
@@ -154,6 +158,7 @@ fn compute(
         let Ok(picture) = unused.recv() else { break };
         let frame = engine.frame;
         let pairs = engine.compute(loops, |index, block| copy(block, &picture[index]));
+        engine.frame += 1;
         if taken.send(Taken { frame, pairs, picture }).is_err() {
             break;
         }

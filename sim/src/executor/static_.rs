@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, Rw
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::barrier::Barrier;
+use super::barrier::{Barrier, OnPanic};
 use super::clock::{Clock, Stage, StageSeconds, Timer};
 use super::engine::check_threads;
 use super::mail::Mail;
@@ -187,6 +187,7 @@ impl Shared {
 
     /// One thread's share of a frame.
     fn compute(&self, worker: usize, own: &mut Own) {
+        let _guard = OnPanic(&self.barrier);
         self.broad_phase(worker);
         self.barrier.wait();
         if worker == 0 {
@@ -360,11 +361,10 @@ impl Executor for StaticExecutor {
 impl Drop for Team {
     fn drop(&mut self) {
         self.shared.stop.store(true, Ordering::Relaxed);
-        if std::thread::panicking() {
-            // The frame may have been broken off anywhere; waiting for the others might never end.
-            return;
+        if !self.shared.barrier.is_broken() {
+            // Between two frames all others are waiting, also if a renderer panicked.
+            self.shared.barrier.arrive();
         }
-        self.shared.barrier.wait();
         for thread in self.threads.drain(..) {
             // A thread ends by panic only through a fault of the executor's own; there is nobody to
             // tell any more.

@@ -94,9 +94,9 @@ pub(super) fn scene(
 ) -> Scene {
     let mut objects: Vec<Object> = objects.collect();
     objects.sort_unstable_by_key(Object::id);
+    let mail = mail.chain(outside.take_letters(frame));
     // What was sent to nobody is not for an object that is added.
-    let mail = mail.filter(|letter| (letter.to.0 as usize) < objects.len());
-    let mail = mail.chain(outside.take_letters(frame)).collect();
+    let mail = mail.filter(|letter| (letter.to.0 as usize) < objects.len()).collect();
     Scene { objects, stages, frame, mail, mailbox: outside.mailbox().clone() }
 }
 

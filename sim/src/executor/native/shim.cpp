@@ -14,13 +14,10 @@
 
 namespace {
 
-/// Threads for one executor: oneTBB gives no more than there are cores unless it is told to.
+/// Threads for one executor.
 struct Arena {
-    explicit Arena(int threads)
-        : control(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads)),
-          arena(threads) {}
+    explicit Arena(int threads) : arena(threads) {}
 
-    tbb::global_control control;
     tbb::task_arena arena;
 };
 
@@ -55,7 +52,13 @@ void dualframe_openmp_dynamic(std::size_t items, void *context,
     }
 }
 
-Arena *dualframe_tbb_new(int threads) noexcept { return new Arena(threads); }
+/// `most` is the greatest number that is ever asked for.
+Arena *dualframe_tbb_new(int threads, std::size_t most) noexcept {
+    // oneTBB gives no more threads than there are cores unless it is told to; one limit for all arenas, since
+    // the least of several counts.
+    static const tbb::global_control control(tbb::global_control::max_allowed_parallelism, most);
+    return new Arena(threads);
+}
 
 void dualframe_tbb_delete(Arena *arena) noexcept { delete arena; }
 

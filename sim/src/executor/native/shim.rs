@@ -10,8 +10,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::ptr::NonNull;
 use std::sync::{Mutex, PoisonError};
 
-use super::super::ExecutorError;
 use super::super::parallel_for::ParallelFor;
+use super::super::{ExecutorError, MAX_THREADS};
 
 /// A closure, as C++ hands it back.
 type Context = *const c_void;
@@ -29,7 +29,7 @@ unsafe extern "C" {
     fn dualframe_openmp_parallel(threads: c_int, context: Context, thread: Call1);
     fn dualframe_openmp_static(items: usize, context: Context, item: Call1);
     fn dualframe_openmp_dynamic(items: usize, context: Context, item: Call1);
-    fn dualframe_tbb_new(threads: c_int) -> NonNull<Arena>;
+    fn dualframe_tbb_new(threads: c_int, most: usize) -> NonNull<Arena>;
     fn dualframe_tbb_delete(arena: NonNull<Arena>);
     fn dualframe_tbb_for(arena: NonNull<Arena>, items: usize, context: Context, part: Call3);
     fn dualframe_tbb_pipeline(
@@ -88,6 +88,9 @@ pub struct Tbb {
 // SAFETY: oneTBB allows work in an arena to be started by any thread, by several at once too.
 unsafe impl Sync for Tbb {}
 
+// SAFETY: an arena belongs to no thread.
+unsafe impl Send for Tbb {}
+
 impl Tbb {
     /// Items in their order through three filters: a source, `work(worker, index, item)` in parallel,
     /// and `finish(worker, index, item)` one after the other in order.
@@ -127,7 +130,7 @@ impl Tbb {
 impl ParallelFor for Tbb {
     fn new(threads: usize) -> Result<Self, ExecutorError> {
         // SAFETY: the number is at least 1, as both of oneTBB's constructors ask.
-        Ok(Self { arena: unsafe { dualframe_tbb_new(threads as c_int) } })
+        Ok(Self { arena: unsafe { dualframe_tbb_new(threads as c_int, MAX_THREADS) } })
     }
 
     fn for_each<T: Send, S>(
@@ -240,6 +243,10 @@ fn call3<F: Fn(usize, usize, usize)>(_: &F) -> Call3 {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::HashSet;
+    use std::thread;
+    use std::time::{Duration, Instant};
+
     use super::*;
 
     const ITEMS: usize = 500;
@@ -303,5 +310,25 @@ mod tests {
             }));
             assert!(failed.is_err());
         }
+    }
+
+    #[test]
+    fn an_arena_beside_another_has_all_its_threads() {
+        let [few, many] = [1, 2].map(|threads| Tbb::new(threads).expect("an arena"));
+        let seen = Mutex::new(HashSet::new());
+        let began = Instant::now();
+        let both = || seen.lock().expect("no panic").len() == 2;
+        many.for_each(
+            &mut [(); 64],
+            |_| (),
+            |_, _, _| {
+                seen.lock().expect("no panic").insert(thread::current().id());
+                while !both() && began.elapsed() < Duration::from_secs(20) {
+                    thread::yield_now();
+                }
+            },
+        );
+        assert!(both(), "one thread did it all");
+        drop(few);
     }
 }

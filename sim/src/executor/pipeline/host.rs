@@ -155,6 +155,8 @@ pub(super) struct Screen<'s> {
     pub(super) on_frame: &'s mut dyn FnMut(&FrameRecord),
     /// What was counted in the frame being rendered.
     pub(super) pairs: PairCount,
+    /// Counts the frames that are done.
+    pub(super) frame: &'s mut u64,
 }
 
 impl<'s> Environment for Host<'s> {
@@ -257,6 +259,7 @@ impl<'s> Environment for Host<'s> {
         let pairs = std::mem::take(&mut screen.pairs);
         (screen.on_frame)(&FrameRecord { frame: number, swapped: Instant::now(), pairs });
         self.shared.outside.swapped(number);
+        *screen.frame = number + 1;
         Ok(())
     }
 }

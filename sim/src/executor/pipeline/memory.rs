@@ -11,6 +11,7 @@ use dualframe_core::unit::UnitId;
 use super::host::{Found, Parcel, Unit};
 use crate::behavior::CONTACTS_PER_OBJECT;
 use crate::block::Block;
+use crate::geometry::Bounds;
 use crate::interaction::ContactRecord;
 use crate::object::Object;
 use crate::stages::Stages;
@@ -25,7 +26,7 @@ const LETTERS_PER_OBJECT: usize = 4;
 const FEWEST_LETTERS: usize = 1_024;
 /// Blocks up to which there is room for every pair of them to be candidates at once.
 const ALL_PAIRS_BLOCKS: usize = 512;
-/// Candidates a frame for each block beyond that; a block has some 26 neighbours.
+/// Candidates a frame for each block beyond that, at least; a block has some 26 neighbours.
 const CANDIDATES_PER_BLOCK: usize = 128;
 
 /// All tables, sized for an environment, kept from run to run.
@@ -106,8 +107,7 @@ impl Tables {
     pub(super) fn limits(&self, blocks: usize) -> Limits {
         let candidates = self.interactions.len() / 2;
         Limits {
-            // There is always room for all that were modelled, and for all pairs that there are.
-            most_candidates: if candidates < pairs(blocks) { candidates / 2 } else { candidates },
+            most_candidates: (candidates < pairs(blocks)).then_some(candidates / 2),
             most_contacts: self.contact_capacity() / 2,
         }
     }
@@ -118,16 +118,18 @@ impl Tables {
         self.fit_queues(blocks);
     }
 
-    /// Doubles the room in a table, for so many blocks.
-    pub(super) fn double(&mut self, table: Table, blocks: usize) {
+    /// Doubles the room in a table at least, for so many blocks: half of it is then enough for `needed` contacts or
+    /// candidates of each of two frames, or for as many letters more.
+    pub(super) fn grow(&mut self, table: Table, needed: usize, blocks: usize) {
+        let from = |before: usize| (2 * before).max(4 * needed);
         match table {
             Table::Contacts => {
-                let size = 2 * self.contacts.len();
+                let size = from(self.contacts.len());
                 self.contacts.resize_with(size, ContactSlot::new);
                 self.segments.resize_with(size, SegmentSlot::new);
             }
-            Table::Letters => self.letters.resize_with(2 * self.letters.len(), LetterSlot::new),
-            _ => self.interactions.resize_with(2 * self.interactions.len(), spare),
+            Table::Letters => self.letters.resize_with(from(self.letters.len()), LetterSlot::new),
+            _ => self.interactions.resize_with(from(self.interactions.len()), spare),
         }
         self.fit_queues(blocks);
     }
@@ -142,19 +144,46 @@ impl Tables {
 /// What of the tables may be used in a frame before they are to grow.
 #[derive(Clone, Copy)]
 pub(super) struct Limits {
-    pub(super) most_candidates: usize,
+    /// None if there is room for every pair of blocks.
+    most_candidates: Option<usize>,
     pub(super) most_contacts: usize,
+}
+
+impl Limits {
+    /// Whether there is room for all pairs of blocks with these boxes that may meet.
+    ///
+    /// # Errors
+    /// How many may, if there is not.
+    pub(super) fn check_pairs(&self, boxes: impl Iterator<Item = Bounds>) -> Result<(), usize> {
+        let Some(most) = self.most_candidates else { return Ok(()) };
+        let pairs = overlapping(boxes);
+        if pairs > most { Err(pairs) } else { Ok(()) }
+    }
 }
 
 fn filled<T>(count: usize, slot: impl Fn() -> T) -> Vec<T> {
     std::iter::repeat_with(slot).take(count).collect()
 }
 
-/// Room for the pairs of blocks that a frame may find near each other.
-pub(super) fn spare_interactions(blocks: usize) -> Vec<InteractionSlot<Found>> {
-    let candidates =
-        if blocks <= ALL_PAIRS_BLOCKS { pairs(blocks) } else { blocks * CANDIDATES_PER_BLOCK };
+/// Room for the pairs of blocks that a frame may find near each other: for twice as many as there are now, where
+/// every pair would be too many.
+pub(super) fn spare_interactions(blocks: &[Block]) -> Vec<InteractionSlot<Found>> {
+    let all = pairs(blocks.len());
+    let candidates = if blocks.len() <= ALL_PAIRS_BLOCKS {
+        all
+    } else {
+        let now = overlapping(blocks.iter().map(Block::bounds));
+        (2 * now).max(blocks.len() * CANDIDATES_PER_BLOCK).min(all)
+    };
     filled(2 * candidates, spare)
+}
+
+/// How many pairs of these boxes overlap, each with itself too.
+fn overlapping(boxes: impl Iterator<Item = Bounds>) -> usize {
+    let boxes: Vec<Bounds> = boxes.collect();
+    let after = |place: usize| boxes[place..].iter();
+    let with_later = boxes.iter().enumerate();
+    with_later.map(|(place, own)| after(place).filter(|other| own.overlaps(other)).count()).sum()
 }
 
 /// Every two blocks, and each with itself.
@@ -188,23 +217,69 @@ pub(super) fn modelled_interactions(
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
+    use crate::behavior::Fixed;
+    use crate::geometry::{Geometry, Rigid};
+    use crate::object::{Group, ObjectId};
+
+    /// So many blocks of one object each, of which the first `crowded` overlap.
+    fn blocks(count: usize, crowded: usize) -> Vec<Block> {
+        let wall = |index: usize| {
+            let mut wall = Rigid::wall(Vec3::ZERO, Vec3::Y);
+            if index >= crowded {
+                wall.shape = parry3d::shape::SharedShape::ball(0.1);
+                wall.pose.translation = Vec3::new(0.0, 1.0, index as f32);
+            }
+            Object::new(ObjectId(index as u32), Group(0), Geometry::Rigid(wall), Fixed)
+        };
+        (0..count).map(|index| Block::new(vec![wall(index)])).collect()
+    }
 
     #[test]
-    fn room_for_candidates_grows_until_it_is_for_every_pair() {
-        // 128 for each of 600, of which half may be used.
-        for (blocks, most) in [(3, 6), (512, 512 * 513 / 2), (600, 600 * 64)] {
-            let all: Vec<Block> = (0..blocks).map(|_| Block::default()).collect();
-            let mut tables = Tables::new(&all, spare_interactions(blocks), 2);
-            assert_eq!(tables.limits(blocks).most_candidates, most);
-            for (grown, table) in [Table::Interactions, Table::Letters].into_iter().enumerate() {
-                let before = [tables.interactions.len(), tables.letters.len()];
-                tables.double(table, blocks);
-                let after = [tables.interactions.len(), tables.letters.len()];
-                assert_eq!(after[grown], 2 * before[grown]);
-                assert_eq!(after[1 - grown], before[1 - grown]);
-                let [interactions, letters] = after;
-                assert_eq!(tables.queues.len(), queue_slots(blocks, interactions, letters, 2));
+    fn room_for_candidates_is_for_those_that_may_meet() {
+        // All pairs of 512; 128 for each of 600; twice the pairs of the 400 that overlap, or all.
+        for (count, crowded, room) in
+            [(3, 0, 6), (512, 9, 512 * 513 / 2), (600, 9, 600 * 128), (600, 400, 400 * 401 + 400)]
+        {
+            let all = blocks(count, crowded);
+            let mut tables = Tables::new(&all, spare_interactions(&all), 2);
+            assert_eq!(tables.interactions.len() / 2, room, "{count}, {crowded}");
+            let boxes = |all: &[Block]| all.iter().map(Block::bounds).collect::<Vec<_>>();
+            let check = |tables: &Tables, all: &[Block]| {
+                tables.limits(count).check_pairs(boxes(all).into_iter())
+            };
+            assert_eq!(check(&tables, &all), Ok(()));
+            let worst = blocks(count, count);
+            if let Err(pairs) = check(&tables, &worst) {
+                assert_eq!((count, pairs), (600, 600 * 601 / 2));
+                tables.grow(Table::Interactions, pairs, count);
+                assert_eq!(check(&tables, &worst), Ok(()));
+            } else {
+                assert!(count <= ALL_PAIRS_BLOCKS, "{count}, {crowded}");
+            }
+        }
+    }
+
+    #[test]
+    fn tables_that_grow_fit_together() {
+        let all = blocks(3, 0);
+        let mut tables = Tables::new(&all, spare_interactions(&all), 2);
+        let sizes = |tables: &Tables| {
+            [tables.interactions.len(), tables.contacts.len(), tables.letters.len()]
+        };
+        for (grown, table) in
+            [Table::Interactions, Table::Contacts, Table::Letters].into_iter().enumerate()
+        {
+            for needed in [1, 100_000] {
+                let mut expected = sizes(&tables);
+                expected[grown] = (2 * expected[grown]).max(4 * needed);
+                tables.grow(table, needed, 3);
+                assert_eq!(sizes(&tables), expected);
+                let [interactions, contacts, letters] = expected;
+                assert_eq!(tables.queues.len(), queue_slots(3, interactions, letters, 2));
+                assert_eq!(tables.segments.len(), contacts);
             }
         }
     }

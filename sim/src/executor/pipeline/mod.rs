@@ -13,7 +13,7 @@ mod overflow;
 mod run;
 mod team;
 
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::panic::resume_unwind;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -88,7 +88,7 @@ impl PipelineExecutor {
             }
         }
         let (broad_phase, interactions) = match grain {
-            Grain::Spatial => (BroadPhase::Spatial, spare_interactions(blocks.len())),
+            Grain::Spatial => (BroadPhase::Spatial, spare_interactions(&blocks)),
             Grain::Pairwise => (BroadPhase::Pairwise, modelled_interactions(&stages, &blocks)),
         };
         let mut mail = Vec::new();
@@ -119,6 +119,7 @@ impl PipelineExecutor {
     /// Runs up to `frames` frames with tables and team as they are, and says why it ended.
     fn run(
         &mut self,
+        workers: usize,
         frames: u64,
         renderer: &mut dyn Renderer,
         on_frame: &mut dyn FnMut(&FrameRecord),
@@ -135,7 +136,13 @@ impl PipelineExecutor {
         };
         self.tables.load(&mut self.blocks);
         let crew = Crew::default();
-        let pipeline = Pipeline::new(self.tables.lend(), self.config, &crew)?;
+        let pipeline = match Pipeline::new(self.tables.lend(), self.config, &crew) {
+            Ok(pipeline) => pipeline,
+            Err(error) => {
+                self.tables.unload(&mut self.blocks);
+                return Err(error.into());
+            }
+        };
         let seconds = std::mem::take(&mut self.seconds);
         let report = Mutex::new(Report { seconds, failure: None });
         let context = Context {
@@ -143,6 +150,7 @@ impl PipelineExecutor {
             crew: &crew,
             pool: &self.pool,
             team: &self.team,
+            workers,
             report: &report,
             timeline: self.timeline.as_deref(),
         };
@@ -152,14 +160,13 @@ impl PipelineExecutor {
             homes: self.config.homes,
             limits,
         };
-        let screen = Screen { renderer, on_frame, pairs: PairCount::default() };
-        let run = AssertUnwindSafe(|| context.run(frames, pipeline, regrouping, screen));
-        let ended = catch_unwind(run);
+        let (frame, pairs) = (&mut self.frame, PairCount::default());
+        let screen = Screen { renderer, on_frame, pairs, frame };
+        let ended = context.run(frames, pipeline, regrouping, screen);
         let report = report.into_inner().unwrap_or_else(PoisonError::into_inner);
         self.tables.unload(&mut self.blocks);
         (self.seconds, self.failure) = (report.seconds, report.failure);
-        let (done, end) = ended.unwrap_or_else(|panic| resume_unwind(panic));
-        self.frame += done;
+        let end = ended.unwrap_or_else(|panic| resume_unwind(panic));
         self.failure.map_or(Ok(end), |full| Err(full.into()))
     }
 
@@ -184,7 +191,7 @@ impl Executor for PipelineExecutor {
         renderer: &mut dyn Renderer,
         on_frame: &mut dyn FnMut(&FrameRecord),
     ) -> Result<(), ExecutorError> {
-        let end = self.frame + frames;
+        let end = self.frame.saturating_add(frames);
         if let Some(full) = self.failure {
             return Err(full.into());
         }
@@ -194,9 +201,11 @@ impl Executor for PipelineExecutor {
                 self.swap_nothing(renderer, on_frame);
                 continue;
             }
-            self.team.grow(self.pool.threads())?;
-            if let End::Outgrown(table) = self.run(end - self.frame, renderer, on_frame)? {
-                self.tables.double(table, self.blocks.len());
+            let workers = self.pool.threads();
+            self.team.grow(workers)?;
+            let frames = end - self.frame;
+            if let End::Outgrown(table, to) = self.run(workers, frames, renderer, on_frame)? {
+                self.tables.grow(table, to, self.blocks.len());
             }
         }
         Ok(())

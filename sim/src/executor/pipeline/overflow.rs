@@ -1,5 +1,6 @@
 //! Letters that the pipeline has no room for.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -19,14 +20,14 @@ pub(super) struct Overflow {
 
 #[derive(Default)]
 struct Late {
-    letters: Vec<Letter>,
+    /// By whom they are for.
+    letters: BTreeMap<UnitId, Vec<Letter>>,
     /// The most letters that waited at once.
     most: usize,
 }
 
 struct Letter {
     due: u64,
-    to: UnitId,
     from: From,
     parcel: Parcel,
 }
@@ -35,11 +36,12 @@ impl Overflow {
     /// Keeps a letter for the update of a unit in the frame `due`.
     pub(super) fn keep(&self, due: u64, to: UnitId, from: From, parcel: Parcel) {
         let mut late = self.lock();
-        late.letters.push(Letter { due, to, from, parcel });
-        late.most = late.most.max(late.letters.len());
+        late.letters.entry(to).or_default().push(Letter { due, from, parcel });
         // Relaxed, as are the others: an update comes after all updates of the frame before, in which its
         // letters were kept, by the pipeline; none of later writes is 0 before they are taken.
-        self.waiting.store(late.letters.len(), Ordering::Relaxed);
+        let waiting = self.waiting.load(Ordering::Relaxed) + 1;
+        self.waiting.store(waiting, Ordering::Relaxed);
+        late.most = late.most.max(waiting);
     }
 
     /// Hands over the letters to a unit for its update in a frame; says whether there were any.
@@ -47,21 +49,23 @@ impl Overflow {
         if self.waiting.load(Ordering::Relaxed) == 0 {
             return false;
         }
-        self.take(|letter| letter.to == to && letter.due <= frame, take)
+        let mut late = self.lock();
+        let Some(letters) = late.letters.get_mut(&to) else { return false };
+        let before = letters.len();
+        let due = letters.extract_if(.., |letter| letter.due <= frame);
+        due.map(|letter| (letter.from, letter.parcel)).for_each(take);
+        let delivered = before - letters.len();
+        let waiting = self.waiting.load(Ordering::Relaxed) - delivered;
+        self.waiting.store(waiting, Ordering::Relaxed);
+        delivered > 0
     }
 
     /// Hands over all letters.
     pub(super) fn empty(&self, take: impl FnMut((From, Parcel))) {
-        self.take(|_| true, take);
-    }
-
-    fn take(&self, is_due: impl Fn(&Letter) -> bool, take: impl FnMut((From, Parcel))) -> bool {
-        let mut late = self.lock();
-        let before = late.letters.len();
-        let due = late.letters.extract_if(.., |letter| is_due(letter));
-        due.map(|letter| (letter.from, letter.parcel)).for_each(take);
-        self.waiting.store(late.letters.len(), Ordering::Relaxed);
-        late.letters.len() < before
+        let letters = std::mem::take(&mut self.lock().letters);
+        self.waiting.store(0, Ordering::Relaxed);
+        let letters = letters.into_values().flatten();
+        letters.map(|letter| (letter.from, letter.parcel)).for_each(take);
     }
 
     /// The most letters that waited at once.

@@ -1,5 +1,6 @@
 //! Frames run with the same tables: batches, and the threads that work on them.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard};
 use std::thread;
 
@@ -31,8 +32,8 @@ pub(super) struct Report {
 pub(super) enum End {
     /// All frames are done, or a table failed.
     Done,
-    /// A table is to grow.
-    Outgrown(Table),
+    /// A table is to grow: that for so much in a frame, or for so many letters more.
+    Outgrown(Table, usize),
     /// More threads are wanted than there are.
     Threads,
 }
@@ -66,17 +67,16 @@ impl Regrouping<'_> {
         shared.overflow.empty(|letter| self.mail.push(letter));
     }
 
-    /// The table that a batch has outgrown, if it did.
-    fn outgrown(&self, shared: &Shared<'_>, pipeline: &mut SimPipeline<'_, '_>) -> Option<Table> {
-        let (candidates, contacts) = pipeline.high_water();
-        let Limits { most_candidates, most_contacts } = self.limits;
-        [
-            (Table::Interactions, candidates > most_candidates),
-            (Table::Contacts, contacts > most_contacts),
-            (Table::Letters, shared.overflow.most() > 0),
-        ]
-        .into_iter()
-        .find_map(|(table, is_outgrown)| is_outgrown.then_some(table))
+    /// Whether a batch has outgrown a table; candidates are counted where blocks are formed.
+    fn outgrown(&self, shared: &Shared<'_>, pipeline: &mut SimPipeline<'_, '_>) -> End {
+        let ((_, contacts), letters) = (pipeline.high_water(), shared.overflow.most());
+        if contacts > self.limits.most_contacts {
+            End::Outgrown(Table::Contacts, contacts)
+        } else if letters > 0 {
+            End::Outgrown(Table::Letters, letters)
+        } else {
+            End::Done
+        }
     }
 
     /// Gives the blocks the homes that they were dealt to.
@@ -87,15 +87,18 @@ impl Regrouping<'_> {
     }
 
     /// Forms the blocks anew from where their objects are, if that is due before a frame.
+    ///
+    /// # Errors
+    /// How many of them may meet, if the table of those that do is to grow first.
     fn regroup_before(
         &mut self,
         frame: u64,
         shared: &Shared<'_>,
         pipeline: &mut SimPipeline<'_, '_>,
-    ) {
+    ) -> Result<(), usize> {
         let due =
             self.blocking.as_deref_mut().filter(|_| world::regroups_before(Grain::Spatial, frame));
-        let Some(blocking) = due else { return };
+        let Some(blocking) = due else { return Ok(()) };
         pipeline.objects_mut().for_each(|unit| blocking.drain(&mut unit.block));
         blocking.split();
         blocking.deal(self.homes);
@@ -106,6 +109,8 @@ impl Regrouping<'_> {
         self.settle(pipeline);
         self.take_mail(shared, pipeline);
         self.post_mail(frame, shared, pipeline);
+        let boxes = pipeline.objects_mut().map(|unit| unit.block.bounds());
+        self.limits.check_pairs(boxes)
     }
 }
 
@@ -128,29 +133,32 @@ pub(super) struct Context<'s, 'x> {
     pub(super) crew: &'s Crew,
     pub(super) pool: &'x Pool,
     pub(super) team: &'x Team,
+    /// How many work, the calling thread included.
+    pub(super) workers: usize,
     pub(super) report: &'x Mutex<Report>,
     pub(super) timeline: Option<&'x Timeline>,
 }
 
 impl<'s> Context<'s, '_> {
-    /// Runs batch after batch until all frames are done, a table fails, or tables or team are to grow;
-    /// says how many frames were done.
+    /// Runs batch after batch until all frames are done, a table fails, or tables or team are to grow. What
+    /// panics comes back as the result, when everybody has gone home.
     pub(super) fn run(
         self,
         frames: u64,
         mut pipeline: SimPipeline<'_, 's>,
         mut regrouping: Regrouping<'_>,
         screen: Screen<'s>,
-    ) -> (u64, End) {
+    ) -> thread::Result<End> {
         regrouping.settle(&mut pipeline);
         regrouping.post_mail(self.shared.first_frame, self.shared, &pipeline);
         let pipeline = RwLock::new(pipeline);
         let attend = |index| self.attend(index, &pipeline);
         let batches = || self.batches(frames, &pipeline, &mut regrouping, screen);
-        let (done, end) = self.team.work(attend, batches);
+        let run = AssertUnwindSafe(|| self.team.work(self.workers, attend, batches));
+        let ended = catch_unwind(run);
         let mut rested = pipeline.into_inner().unwrap_or_else(PoisonError::into_inner);
         regrouping.take_mail(self.shared, &mut rested);
-        (done, end)
+        ended
     }
 
     /// What the calling thread does while the others attend.
@@ -160,21 +168,24 @@ impl<'s> Context<'s, '_> {
         pipeline: &RwLock<SimPipeline<'_, 's>>,
         regrouping: &mut Regrouping<'_>,
         mut screen: Screen<'s>,
-    ) -> (u64, End) {
+    ) -> End {
         let dismissal = Dismissal(self.crew);
         let host = Host::new(self.shared, self.team.take_own(0));
-        self.crew.await_present(self.team.workers() - 1, self.pool);
-        self.make_room_for(self.team.workers());
+        self.crew.await_present(self.workers - 1, self.pool);
+        self.make_room_for(self.workers);
         let (mut done, mut end) = (0, End::Done);
         while done < frames && self.failure().is_none() {
-            if self.pool.threads() > self.team.workers() {
+            if self.pool.threads() > self.workers {
                 end = End::Threads;
                 break;
             }
             let frame = self.shared.first_frame + done;
             let batch = (FRAMES_PER_BLOCKING - frame % FRAMES_PER_BLOCKING).min(frames - done);
             let Ok(mut resting) = pipeline.write() else { break };
-            regrouping.regroup_before(frame, self.shared, &mut resting);
+            if let Err(pairs) = regrouping.regroup_before(frame, self.shared, &mut resting) {
+                end = End::Outgrown(Table::Interactions, pairs);
+                break;
+            }
             if resting.run(batch as u32).is_err() {
                 break;
             }
@@ -183,15 +194,15 @@ impl<'s> Context<'s, '_> {
             screen = self.lead(&read(pipeline), &host, screen);
             done += batch;
             let Ok(mut rested) = pipeline.write() else { break };
-            if let Some(table) = regrouping.outgrown(self.shared, &mut rested) {
-                end = End::Outgrown(table);
+            end = regrouping.outgrown(self.shared, &mut rested);
+            if end != End::Done {
                 break;
             }
         }
         self.team.give_own(0, host.into_own());
         drop(dismissal);
         self.crew.see_off(self.pool);
-        (done, end)
+        end
     }
 
     /// The calling thread's part in a batch: it alone renders.

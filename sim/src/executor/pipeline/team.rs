@@ -51,11 +51,6 @@ impl Drop for Hired {
 }
 
 impl Team {
-    /// The number of workers, the calling thread included.
-    pub(super) fn workers(&self) -> usize {
-        self.own.len()
-    }
-
     /// Hires threads until there are so many workers. What those that there were work in is kept.
     ///
     /// # Errors
@@ -71,14 +66,19 @@ impl Team {
         Ok(())
     }
 
-    /// Calls `lead` on the calling thread and `attend`, with their numbers, on all others at once;
-    /// returns when all have.
-    pub(super) fn work<R>(&self, attend: impl Fn(usize) + Sync, lead: impl FnOnce() -> R) -> R {
+    /// Calls `lead` on the calling thread and `attend`, with their numbers, on the others of so many workers at
+    /// once, who were hired before; returns when all have.
+    pub(super) fn work<R>(
+        &self,
+        workers: usize,
+        attend: impl Fn(usize) + Sync,
+        lead: impl FnOnce() -> R,
+    ) -> R {
         let hired = self.hired.as_ref().and_then(|hired| hired.pool.as_ref());
-        let Some(pool) = hired else { return lead() };
+        let Some(pool) = hired.filter(|_| workers > 1) else { return lead() };
         let attend = &attend;
         pool.in_place_scope(|scope: &Scope<'_>| {
-            for index in 1..self.own.len() {
+            for index in 1..workers {
                 scope.spawn(move |_| attend(index));
             }
             lead()
@@ -111,13 +111,13 @@ mod tests {
     use super::*;
 
     /// On which threads one run's attendants were, all at once, by their numbers.
-    fn attendants(team: &Team) -> Vec<(usize, ThreadId)> {
-        let (all, seen) = (Barrier::new(team.workers()), Mutex::new(Vec::new()));
+    fn attendants(team: &Team, workers: usize) -> Vec<(usize, ThreadId)> {
+        let (all, seen) = (Barrier::new(workers), Mutex::new(Vec::new()));
         let attend = |index| {
             all.wait();
             seen.lock().expect("no panic").push((index, thread::current().id()));
         };
-        let leader = team.work(attend, || {
+        let leader = team.work(workers, attend, || {
             all.wait();
             thread::current().id()
         });
@@ -156,7 +156,7 @@ mod tests {
             ENDING.set(Some(Ending(Arc::clone(&ended))));
             all.wait();
         };
-        team.work(attend, || all.wait());
+        team.work(3, attend, || all.wait());
         assert_eq!(ended.load(Ordering::Relaxed), 0);
         drop(team);
         assert_eq!(ended.load(Ordering::Relaxed), 2);
@@ -166,14 +166,15 @@ mod tests {
     fn threads_last_from_run_to_run() {
         let mut team = Team::default();
         team.grow(1).expect("nobody to hire");
-        assert_eq!(attendants(&team), []);
+        assert_eq!(attendants(&team, 1), []);
         team.grow(4).expect("threads");
-        let first = attendants(&team);
+        let first = attendants(&team, 4);
         assert_eq!(first.iter().map(|&(index, _)| index).collect::<Vec<_>>(), [1, 2, 3]);
         assert_eq!(threads(&first).len(), 3);
         team.grow(2).expect("there are more already");
-        assert_eq!(threads(&attendants(&team)), threads(&first));
+        assert_eq!(threads(&attendants(&team, 4)), threads(&first));
+        assert_eq!(attendants(&team, 2).len(), 1, "the others are not called");
         team.grow(5).expect("threads");
-        assert_eq!(threads(&attendants(&team)).len(), 4);
+        assert_eq!(threads(&attendants(&team, 5)).len(), 4);
     }
 }
