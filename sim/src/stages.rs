@@ -14,7 +14,7 @@ use crate::behavior::{Input, SpringWork, Workspace, batch};
 use crate::block::Block;
 use crate::geometry::Mesh;
 use crate::interaction::{
-    ContactRecord, ContactSink, Member, PairScratch, Rules, Scratch, Segment, TableFull,
+    ContactBuffer, ContactRecord, Member, PairScratch, Rules, Scratch, Segment,
 };
 use crate::message::Message;
 use crate::object::{Drawing, Fault, FaultKind, Object, ObjectId};
@@ -80,57 +80,50 @@ impl Stages {
         block.objects.len() > 1 && self.rules.apply(block.groups(), block.groups())
     }
 
-    /// Lets the objects of one block interact with those of another.
-    ///
-    /// # Errors
-    /// The sink is full. The frame's results are then incomplete: enlarge the table and interact the
-    /// two blocks anew into an emptied sink.
+    /// Lets the objects of one block interact with those of another, and adds what that does to them to `results`.
     pub fn interact(
         &self,
         a: &Block,
         b: &Block,
         scratch: &mut Scratch,
-        sink: &mut impl ContactSink,
-    ) -> Result<PairCount, TableFull> {
+        results: &mut ContactBuffer,
+    ) -> PairCount {
         let (few, many) = if a.objects.len() < b.objects.len() { (a, b) } else { (b, a) };
         let Scratch { pairs, pair } = scratch;
         pairs.clear();
         few.overlaps(self.simd, many, pairs);
         let objects = pairs.iter().map(|&[one, other]| [few.member(one), many.member(other)]);
-        self.interact_pairs(objects, pair, sink)
+        self.interact_pairs(objects, pair, results)
     }
 
-    /// Lets the objects within one block interact with each other.
-    ///
-    /// # Errors
-    /// As [`Stages::interact`].
+    /// Lets the objects within one block interact with each other, likewise.
     pub fn interact_within(
         &self,
         block: &Block,
         scratch: &mut Scratch,
-        sink: &mut impl ContactSink,
-    ) -> Result<PairCount, TableFull> {
+        results: &mut ContactBuffer,
+    ) -> PairCount {
         let Scratch { pairs, pair } = scratch;
         pairs.clear();
         block.overlaps_within(self.simd, pairs);
         let objects = pairs.iter().map(|places| places.map(|place| block.member(place)));
-        self.interact_pairs(objects, pair, sink)
+        self.interact_pairs(objects, pair, results)
     }
 
     fn interact_pairs<'o>(
         &self,
         pairs: impl Iterator<Item = [Member<'o>; 2]>,
         scratch: &mut PairScratch,
-        sink: &mut impl ContactSink,
-    ) -> Result<PairCount, TableFull> {
+        results: &mut ContactBuffer,
+    ) -> PairCount {
         let mut count = PairCount::default();
         for [a, b] in pairs {
             if let Some((pair, bodies)) = self.rules.find(a, b) {
-                let touched = scratch.interact(pair, bodies, self, sink)?;
+                let touched = scratch.interact(pair, bodies, self, results);
                 count += PairCount { candidates: 1, collisions: u64::from(touched) };
             }
         }
-        Ok(count)
+        count
     }
 
     /// Updates the objects of a block.

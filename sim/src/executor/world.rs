@@ -223,12 +223,10 @@ impl Outcome {
         scratch: &mut Scratch,
     ) {
         self.contacts.clear();
-        let counted = match second {
+        self.pairs = match second {
             Some(second) => stages.interact(first, second, scratch, &mut self.contacts),
             None => stages.interact_within(first, scratch, &mut self.contacts),
         };
-        // A buffer in growing memory is never full.
-        self.pairs = counted.unwrap_or_default();
     }
 
     pub(super) fn records(&self) -> &[ContactRecord] {

@@ -1,7 +1,5 @@
 //! The results of interactions: what updates are given.
 
-use thiserror::Error;
-
 use super::Member;
 use crate::object::ObjectId;
 
@@ -117,25 +115,6 @@ impl<'r> Segment<'r> {
     }
 }
 
-/// A table of contacts has no room for a segment. Nothing of the segment was stored.
-#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
-#[error("the contact table holds {capacity} records, {needed} are needed")]
-pub struct TableFull {
-    /// How many records the table holds.
-    pub capacity: usize,
-    /// How many it would have to hold for this segment, at least.
-    pub needed: usize,
-}
-
-/// Where interactions put their results.
-pub trait ContactSink {
-    /// Stores a segment. There is at most one for an ordered pair of objects in a frame.
-    ///
-    /// # Errors
-    /// The table is full.
-    fn push(&mut self, segment: Segment<'_>) -> Result<(), TableFull>;
-}
-
 /// Contacts in memory that grows as needed and is used again.
 #[derive(Clone, Debug, Default)]
 pub struct ContactBuffer(Vec<ContactRecord>);
@@ -147,6 +126,11 @@ impl ContactBuffer {
         Self(Vec::with_capacity(records))
     }
 
+    /// Stores a segment. There is at most one for an ordered pair of objects in a frame.
+    pub(crate) fn push(&mut self, segment: Segment<'_>) {
+        self.0.extend_from_slice(segment.records());
+    }
+
     /// Forgets the contents, keeps the memory.
     pub fn clear(&mut self) {
         self.0.clear();
@@ -156,12 +140,5 @@ impl ContactBuffer {
     #[must_use]
     pub fn records(&self) -> &[ContactRecord] {
         &self.0
-    }
-}
-
-impl ContactSink for ContactBuffer {
-    fn push(&mut self, segment: Segment<'_>) -> Result<(), TableFull> {
-        self.0.extend_from_slice(segment.records());
-        Ok(())
     }
 }

@@ -1,6 +1,6 @@
 //! Interactions (§4.1, Fig. 3): what objects do to each other.
 //!
-//! An interaction only reads its two objects. What it finds goes to a [`ContactSink`], and the
+//! An interaction only reads its two objects. What it finds goes to a [`ContactBuffer`], and the
 //! objects' next updates add it up (§5.6).
 
 mod attachment;
@@ -26,7 +26,7 @@ pub use attachment::{Attached, Link};
 pub use bone_nodes::NodesInBone;
 pub use burr::{BurrForce, BurrInBone};
 pub use compliant::{Compliant, CompliantError};
-pub use contact::{Contact, ContactBuffer, ContactRecord, ContactSink, Segment, TableFull};
+pub use contact::{Contact, ContactBuffer, ContactRecord, Segment};
 pub use impulses::Impulses;
 pub use nodes::NodeSpheres;
 pub use penalty::{Penalty, PenaltyError};
@@ -115,8 +115,8 @@ impl PairScratch {
         pair: &InteractionPair,
         [first, second]: [Member<'_>; 2],
         stages: &Stages,
-        sink: &mut impl ContactSink,
-    ) -> Result<bool, TableFull> {
+        results: &mut ContactBuffer,
+    ) -> bool {
         self.touches.clear();
         self.touches.simd = stages.simd;
         let bodies = [first.object, second.object];
@@ -139,18 +139,18 @@ impl PairScratch {
             for ends in [[first, second], [second, first]] {
                 let head = ContactRecord::head(1, ends);
                 let fault = ContactRecord::contact(Contact::FAULT, [0.0; 3]);
-                sink.push(Segment::new(&[head, fault]))?;
+                results.push(Segment::new(&[head, fault]));
             }
-            return Ok(false);
+            return false;
         }
         for (impulses, ends) in self.impulses.iter_mut().zip([[first, second], [second, first]]) {
             // Nobody would read what scenery is told.
             if !ends[0].object.is_fixed()
                 && let Some(segment) = impulses.segment(ends)
             {
-                sink.push(segment)?;
+                results.push(segment);
             }
         }
-        Ok(!self.touches.list().is_empty())
+        !self.touches.list().is_empty()
     }
 }

@@ -118,9 +118,9 @@ impl Reference {
         for first in (0..self.blocks.len()).rev() {
             let a = &self.blocks[first];
             for b in self.blocks[..first].iter().rev() {
-                count += self.stages.interact(a, b, &mut scratch, &mut buffer).expect("grows");
+                count += self.stages.interact(a, b, &mut scratch, &mut buffer);
             }
-            count += self.stages.interact_within(a, &mut scratch, &mut buffer).expect("grows");
+            count += self.stages.interact_within(a, &mut scratch, &mut buffer);
         }
         let mut workspace = Workspace::default();
         let segments: Vec<_> = Segment::all(buffer.records()).map(Segment::records).collect();

@@ -191,8 +191,7 @@ impl<'s> Environment for Host<'s> {
         } else {
             stages.interact(&a.block, &b.block, scratch, results)
         };
-        // A buffer in growing memory is never full.
-        *found = Found::new(counted.unwrap_or_default());
+        *found = Found::new(counted);
         if contacts.push(results.records()).is_err() {
             found.late = Some(Box::new(results.clone()));
         }
