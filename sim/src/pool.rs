@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use core_affinity::CoreId;
 use dualframe_core::environment::Environment;
 use dualframe_core::probe::Probe;
 use dualframe_core::wait::{Bell, Epoch, Waiting};
@@ -28,7 +29,8 @@ pub fn cores() -> usize {
 #[derive(Debug)]
 pub struct Pool {
     threads: AtomicUsize,
-    pinned: bool,
+    /// The cores that threads are bound to, if they are.
+    pinned_to: Vec<CoreId>,
     cores: usize,
 }
 
@@ -39,7 +41,8 @@ impl Pool {
     #[must_use]
     pub fn new(threads: usize, pinned: bool) -> Self {
         let threads = AtomicUsize::new(threads.clamp(1, MAX_THREADS));
-        Self { threads, pinned, cores: cores() }
+        let pinned_to = pinned.then(core_affinity::get_core_ids).flatten().unwrap_or_default();
+        Self { threads, pinned_to, cores: cores() }
     }
 
     /// The number of threads asked for.
@@ -55,12 +58,9 @@ impl Pool {
 
     /// Binds the calling thread, which is worker number `index`, to a core.
     pub(crate) fn pin(&self, index: usize) {
-        if !self.pinned {
-            return;
-        }
         // A system that cannot pin, or does not say what cores there are, is as good without.
-        if let Some(cores) = core_affinity::get_core_ids().filter(|cores| !cores.is_empty()) {
-            core_affinity::set_for_current(cores[index % cores.len()]);
+        if !self.pinned_to.is_empty() {
+            core_affinity::set_for_current(self.pinned_to[index % self.pinned_to.len()]);
         }
     }
 

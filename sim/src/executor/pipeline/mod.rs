@@ -23,6 +23,7 @@ use dualframe_core::pipeline::{BroadPhase, Config, MOST_HOMES, Pipeline};
 
 pub use dualframe_core::frame::Entry;
 
+use self::clock::Times;
 use self::host::{Parcel, Register, Screen, Shared};
 use self::memory::{Tables, modelled_interactions, spare_interactions};
 use self::overflow::Overflow;
@@ -59,7 +60,7 @@ pub struct PipelineExecutor {
     /// Objects' messages for the next frame.
     mail: Vec<(From, Parcel)>,
     outside: Outside,
-    seconds: Vec<StageSeconds>,
+    times: Vec<Times>,
     timeline: Option<Arc<Timeline>>,
     failure: Option<TableFull>,
 }
@@ -110,7 +111,7 @@ impl PipelineExecutor {
             frame,
             mail,
             outside,
-            seconds: Vec::new(),
+            times: Vec::new(),
             timeline: None,
             failure: None,
         })
@@ -143,8 +144,8 @@ impl PipelineExecutor {
                 return Err(error.into());
             }
         };
-        let seconds = std::mem::take(&mut self.seconds);
-        let report = Mutex::new(Report { seconds, failure: None });
+        let times = std::mem::take(&mut self.times);
+        let report = Mutex::new(Report { times, failure: None });
         let context = Context {
             shared: &shared,
             crew: &crew,
@@ -165,7 +166,7 @@ impl PipelineExecutor {
         let ended = context.run(frames, pipeline, regrouping, screen);
         let report = report.into_inner().unwrap_or_else(PoisonError::into_inner);
         self.tables.unload(&mut self.blocks);
-        (self.seconds, self.failure) = (report.seconds, report.failure);
+        (self.times, self.failure) = (report.times, report.failure);
         let end = ended.unwrap_or_else(|panic| resume_unwind(panic));
         self.failure.map_or(Ok(end), |full| Err(full.into()))
     }
@@ -248,7 +249,7 @@ impl Executor for PipelineExecutor {
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {
-        self.seconds.clone()
+        self.times.iter().map(Times::seconds).collect()
     }
 }
 

@@ -10,12 +10,12 @@ use dualframe_core::pipeline::Pipeline;
 use dualframe_core::token::Token;
 use dualframe_core::worker::Step;
 
-use super::clock::StageClock;
+use super::clock::{StageClock, Times};
 use super::host::{Host, Parcel, Screen, Shared};
 use super::memory::Limits;
 use super::team::Team;
 use crate::blocking::{Blocking, FRAMES_PER_BLOCKING, Grain};
-use crate::executor::{StageSeconds, world};
+use crate::executor::world;
 use crate::pool::{Crew, Pool};
 use crate::timeline::Timeline;
 
@@ -23,7 +23,7 @@ type SimPipeline<'m, 's> = Pipeline<'m, Host<'s>, &'s Crew>;
 
 /// What workers leave behind.
 pub(super) struct Report {
-    pub(super) seconds: Vec<StageSeconds>,
+    pub(super) times: Vec<Times>,
     pub(super) failure: Option<TableFull>,
 }
 
@@ -276,16 +276,16 @@ impl<'s> Context<'s, '_> {
     /// Notes the times of so many workers without allocating later.
     fn make_room_for(self, workers: usize) {
         let mut report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
-        if report.seconds.len() < workers {
-            report.seconds.resize(workers, StageSeconds::default());
+        if report.times.len() < workers {
+            report.times.resize(workers, Times::default());
         }
     }
 
     fn note(self, index: usize, clock: &mut StageClock<'_>) {
         let mut report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(seconds) = report.seconds.get_mut(index) {
+        if let Some(times) = report.times.get_mut(index) {
             clock.stop();
-            clock.add_to(seconds);
+            times.add(clock.times());
         }
     }
 
