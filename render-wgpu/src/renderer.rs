@@ -164,6 +164,8 @@ impl Painter {
     /// Ends the frame without a picture.
     pub fn discard(&mut self) {
         self.view = None;
+        // What was written to the device waits in memory of its own until something is submitted.
+        self.gpu.queue.submit([]);
     }
 
     /// Ends the frame: encodes how `picture`, a view of a texture of this size and format, is made of

@@ -331,6 +331,6 @@ impl<H: Hand> Renderer for View<H> {
         }
         self.attend(Duration::ZERO);
         self.pace.keep(self.controls.is_real_time);
-        self.is_shown = self.pace.shows(self.painter.gpu());
+        self.is_shown = self.pace.shows(self.painter.gpu()) && self.screen.is_visible();
     }
 }

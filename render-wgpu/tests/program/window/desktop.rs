@@ -15,12 +15,13 @@ use x11rb::connection::Connection;
 use x11rb::cookie::VoidCookie;
 use x11rb::errors::ConnectionError;
 use x11rb::protocol::xproto::{
-    AtomEnum, BUTTON_PRESS_EVENT, BUTTON_RELEASE_EVENT, ClientMessageEvent, ConfigureWindowAux,
-    ConnectionExt, EventMask, ImageFormat, InputFocus, KEY_PRESS_EVENT, KEY_RELEASE_EVENT,
-    MOTION_NOTIFY_EVENT, MapState, Window,
+    Atom, AtomEnum, BUTTON_PRESS_EVENT, BUTTON_RELEASE_EVENT, ClientMessageEvent,
+    ConfigureWindowAux, ConnectionExt, EventMask, ImageFormat, InputFocus, KEY_PRESS_EVENT,
+    KEY_RELEASE_EVENT, MOTION_NOTIFY_EVENT, MapState, PropMode, Window,
 };
 use x11rb::protocol::xtest::ConnectionExt as _;
 use x11rb::rust_connection::RustConnection;
+use x11rb::wrapper::ConnectionExt as _;
 
 /// The display's width and height, in pixels.
 const SCREEN: (u16, u16) = (1280, 1024);
@@ -144,6 +145,11 @@ impl Desktop {
     fn fake(&self, kind: u8, detail: u8, x: i16, y: i16) {
         let (now, root) = (CURRENT_TIME, self.root);
         self.sync(self.connection.xtest_fake_input(kind, detail, now, root, x, y, 0));
+    }
+
+    fn atom(&self, name: &str) -> Atom {
+        let asked = self.connection.intern_atom(false, name.as_bytes());
+        asked.expect("the server lives").reply().expect("an atom").atom
     }
 
     /// Waits until the server has done what it was asked for.
@@ -281,15 +287,31 @@ impl Session<'_> {
         }
     }
 
+    /// Says that the window is minimised, or no longer, as a window manager does.
+    pub(crate) fn minimize(&self, is_minimized: bool) {
+        let Desktop { connection, .. } = self.desktop;
+        let hidden = [self.desktop.atom("_NET_WM_STATE_HIDDEN")];
+        let states = if is_minimized { &hidden[..] } else { &[] };
+        let (mode, state) = (PropMode::REPLACE, self.desktop.atom("_NET_WM_STATE"));
+        let atoms = AtomEnum::ATOM;
+        self.desktop.sync(connection.change_property32(mode, self.window, state, atoms, states));
+    }
+
+    /// The memory that it has, in bytes.
+    pub(crate) fn memory(&self) -> u64 {
+        let status = fs::read_to_string(format!("/proc/{}/status", self.child.id()));
+        let status = status.expect("it runs on Linux");
+        let resident = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+        let kilobytes = resident.and_then(|rest| rest.trim().strip_suffix(" kB"));
+        1_024 * kilobytes.and_then(|number| number.parse::<u64>().ok()).expect("a number")
+    }
+
     /// Closes the window as a window manager does; see [`Session::end`].
     pub(crate) fn close(self) -> Value {
         let desktop = self.desktop;
-        let atom = |name: &str| {
-            let asked = desktop.connection.intern_atom(false, name.as_bytes());
-            asked.expect("the server lives").reply().expect("an atom").atom
-        };
-        let data = [atom("WM_DELETE_WINDOW"), CURRENT_TIME, 0, 0, 0];
-        let message = ClientMessageEvent::new(32, self.window, atom("WM_PROTOCOLS"), data);
+        let data = [desktop.atom("WM_DELETE_WINDOW"), CURRENT_TIME, 0, 0, 0];
+        let protocols = desktop.atom("WM_PROTOCOLS");
+        let message = ClientMessageEvent::new(32, self.window, protocols, data);
         let (window, nobody) = (self.window, EventMask::NO_EVENT);
         desktop.sync(desktop.connection.send_event(false, window, nobody, message));
         self.end()

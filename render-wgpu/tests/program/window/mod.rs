@@ -212,6 +212,22 @@ fn a_window_of_any_size_shown_or_not() {
 
 #[test]
 #[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn a_minimized_window_draws_nothing_and_needs_no_more_memory() {
+    let desktop = Desktop::start();
+    let mut session = desktop.open(&["--objects", "300", "--size", "640x480"]);
+    session.minimize(true);
+    let hidden = session.wait_until_still();
+    let before = session.memory();
+    sleep(2 * STILL);
+    let more = session.memory().saturating_sub(before);
+    assert!(more < 10_000_000, "{more} bytes");
+    session.minimize(false);
+    session.wait_for("another picture", |now| now.difference(&hidden) > 0);
+    session.close();
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
 fn odd_sizes() {
     let desktop = Desktop::start();
     for size in ["1x1", "16384x1", "1x4000"] {
