@@ -234,7 +234,8 @@ impl Surfaces {
             let lists = [(&make.surfaces, &make.triangles), (&make.wires, &make.edges)];
             for (are_wires, (list, indices)) in [false, true].into_iter().zip(lists) {
                 let end = first + size_of_val(list.as_slice());
-                if !list.is_empty() {
+                // There are bodies without triangles.
+                if !list.is_empty() && indices.count > 0 {
                     let instances = self.sent.buffer.slice(first as u64..end as u64);
                     let count = list.len() as u32;
                     draw(Batch { make, numbers, indices, instances, count, are_wires });
