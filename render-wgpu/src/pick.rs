@@ -5,6 +5,7 @@ use std::sync::mpsc::Sender;
 use bytemuck::{Pod, Zeroable};
 use dualframe_sim::object::ObjectId;
 use glam::{Mat4, Vec2, Vec3};
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{
     BindGroup, Buffer, BufferDescriptor, BufferUsages, ColorTargetState, CommandEncoder, Device,
     Extent3d, FragmentState, LoadOp, MultisampleState, Operations, PipelineLayoutDescriptor,
@@ -34,12 +35,22 @@ pub struct Picked {
     pub place: Vec3,
 }
 
-/// Asks what is under a pixel of the next frame.
+/// Asks what is under a pixel of the next frame. Only surfaces are found: volumes and what is drawn by its
+/// edges are not there for it.
 pub struct Pick {
-    /// The pixel's middle, from (−1, −1) at the lower left of the picture to (1, 1).
-    pub point: Vec2,
-    /// Where the answer goes: `None` if there is no object. Without an answer the device failed.
-    pub answer: Sender<Option<Picked>>,
+    point: Vec2,
+    answer: Sender<Option<Picked>>,
+    /// Of the frame that was asked, once it is known: the next one may be seen from elsewhere.
+    view_projection: Mat4,
+}
+
+impl Pick {
+    /// `point` is the pixel's middle, from (−1, −1) at the lower left of the picture to (1, 1). The answer goes
+    /// to `answer`: `None` if there is no object. Without an answer the device failed.
+    #[must_use]
+    pub fn new(point: Vec2, answer: Sender<Option<Picked>>) -> Self {
+        Self { point, answer, view_projection: Mat4::IDENTITY }
+    }
 }
 
 impl GpuUnit for Pick {
@@ -48,14 +59,15 @@ impl GpuUnit for Pick {
     }
 
     fn encode(&mut self, context: &Context<'_>, encoder: &mut CommandEncoder) -> Option<Buffer> {
+        self.view_projection = context.view.view_projection;
         Some(context.picker.encode(context, self.point, encoder))
     }
 
-    fn finish(self: Box<Self>, context: &Context<'_>, results: Result<&[u8], GraphicsError>) {
+    fn finish(self: Box<Self>, _context: &Context<'_>, results: Result<&[u8], GraphicsError>) {
         let hit = results.ok().and_then(|bytes| bytes.get(..size_of::<Hit>()));
         let Some(hit) = hit.map(bytemuck::pod_read_unaligned::<Hit>) else { return };
         // Whoever asked may have gone.
-        let _ = self.answer.send(hit.resolve(context, self.point));
+        let _ = self.answer.send(hit.resolve(self.point, &self.view_projection));
     }
 }
 
@@ -70,10 +82,10 @@ struct Hit {
 }
 
 impl Hit {
-    fn resolve(self, context: &Context<'_>, point: Vec2) -> Option<Picked> {
+    fn resolve(self, point: Vec2, view_projection: &Mat4) -> Option<Picked> {
         let object = self.object_plus_one.checked_sub(1)?;
         let clip = point.extend(f32::from_bits(self.depth));
-        let place = context.view.view_projection.inverse().project_point3(clip);
+        let place = view_projection.inverse().project_point3(clip);
         Some(Picked { object: ObjectId(object), node: self.node, place })
     }
 }
@@ -117,8 +129,13 @@ impl Picker {
         let crop = Mat4::from_scale(scale) * Mat4::from_translation(-point.extend(0.0));
         let view = context.view.seen_by(crop * context.view.view_projection);
         let numbers = view.numbers();
-        let bytes = bytemuck::cast_slice(numbers.as_words());
-        context.gpu.queue.write_buffer(&self.numbers, 0, bytes);
+        // The queue's own writes would all be done before the first of several picks.
+        let sent = context.gpu.device.create_buffer_init(&BufferInitDescriptor {
+            label: Some("picking"),
+            contents: bytemuck::cast_slice(numbers.as_words()),
+            usage: BufferUsages::COPY_SRC,
+        });
+        encoder.copy_buffer_to_buffer(&sent, 0, &self.numbers, 0, Globals::SIZE);
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("picking"),
             color_attachments: &[Some(RenderPassColorAttachment {

@@ -47,7 +47,7 @@ fn the_run_goes_on() {
                 device.destroy();
             }
             let (answer, answered) = std::sync::mpsc::channel();
-            let pick = Pick { point: Vec2::ZERO, answer };
+            let pick = Pick::new(Vec2::ZERO, answer);
             auxiliary.submit(Box::new(pick)).expect("the queue takes one a frame");
             answers.push(answered);
         };

@@ -1,25 +1,36 @@
-//! Frames that are not drawn, and bodies without a surface.
+//! Frames that are not drawn, bodies without a surface, and several questions at once.
 
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
 
 use dualframe_render_wgpu::gpu::Gpu;
 use dualframe_render_wgpu::look::{Look, Quality};
+use dualframe_render_wgpu::pick::{Pick, Picked};
 use dualframe_render_wgpu::renderer::Offscreen;
 use dualframe_sim::behavior::Fixed;
-use dualframe_sim::geometry::{Bounds, Geometry, Mesh, Topology};
+use dualframe_sim::geometry::{Bounds, Geometry, Mesh, Rigid, Topology};
 use dualframe_sim::object::{Drawing, Group, Object, ObjectId};
 use dualframe_sim::render::Renderer;
 use dualframe_sim::scene::ParticleScene;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
+use parry3d::math::Pose;
+use parry3d::shape::SharedShape;
 use wgpu::PollType;
 
 const SIZE: (u32, u32) = (320, 240);
+const RADIUS: f32 = 0.1;
 
 /// Sees a cube of 2 m around the origin.
 fn offscreen() -> Offscreen {
     let focus = Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
     let gpu = Gpu::new(None).expect("these tests need a graphics adapter; one in software will do");
     Offscreen::new(gpu, Look::room(focus, Quality::Fast), SIZE).expect("a small picture")
+}
+
+fn ball(id: u32, place: Vec3) -> Object {
+    let shape = SharedShape::ball(RADIUS);
+    let rigid = Rigid::new(shape, Pose::from_translation(place));
+    Object::new(ObjectId(id), Group(0), Geometry::Rigid(rigid), Fixed)
 }
 
 /// The bytes that the device has in use.
@@ -64,4 +75,41 @@ fn a_mesh_without_triangles_is_not_drawn() {
         offscreen.swap(1);
         assert_eq!(offscreen.picture().as_ref(), Ok(&empty), "{drawing:?}");
     }
+}
+
+/// Asks what is at a place of the next frame.
+fn ask(offscreen: &Offscreen, place: Vec3) -> Receiver<Option<Picked>> {
+    let (answer, answered) = channel();
+    let aspect = SIZE.0 as f32 / SIZE.1 as f32;
+    let point = offscreen.painter.camera.view_projection(aspect).project_point3(place);
+    let pick = Pick::new(Vec2::new(point.x, point.y), answer);
+    offscreen.painter.auxiliary().submit(Box::new(pick)).expect("there is room");
+    answered
+}
+
+#[test]
+#[ignore = "needs a graphics adapter; .ci/run has one"]
+fn every_question_has_its_own_answer() {
+    let places = [Vec3::new(-0.5, 0.2, 0.3), Vec3::new(0.6, -0.1, 0.1), Vec3::new(0.0, 0.5, -0.4)];
+    let balls: Vec<_> = (0..).zip(places).map(|(id, place)| ball(id, place)).collect();
+    let mut offscreen = offscreen();
+    let frame = |offscreen: &mut Offscreen| {
+        balls.iter().for_each(|object| offscreen.draw(object));
+        offscreen.swap(0);
+    };
+    let answers = places.map(|place| ask(&offscreen, place));
+    let beside = ask(&offscreen, Vec3::new(-0.5, -0.5, 0.3));
+    // They wait for a frame, and the answers for the next one, which is seen from elsewhere.
+    frame(&mut offscreen);
+    frame(&mut offscreen);
+    offscreen.painter.camera.orbit(1.0, 0.3);
+    offscreen.painter.camera.zoom(1.5);
+    frame(&mut offscreen);
+    for ((id, place), answer) in (0..).zip(places).zip(&answers) {
+        let picked = answer.try_recv().expect("an answer").expect("a ball is there");
+        assert_eq!(picked.object, ObjectId(id));
+        let off = picked.place.distance(place) - RADIUS;
+        assert!(off.abs() < 0.05 * RADIUS, "ball {id}: {off} m off its surface");
+    }
+    assert_eq!(beside.try_recv(), Ok(None));
 }

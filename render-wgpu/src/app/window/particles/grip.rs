@@ -47,7 +47,7 @@ impl Hand for Grip {
 
     fn press(&mut self, aim: &Aim<'_>) {
         let (answer, answered) = channel();
-        let asked = Pick { point: aim.point, answer };
+        let asked = Pick::new(aim.point, answer);
         // With the queue full of work nothing is grabbed this time.
         let asked = aim.painter.auxiliary().submit(Box::new(asked));
         self.held = if asked.is_ok() { Held::Asked(answered) } else { Held::Air };
