@@ -26,13 +26,15 @@ use glam::Vec3;
 
 use super::AllocationCounter;
 use super::args::CraniotomyArgs;
+use super::error::RunError;
 use super::haptics::{Cells, Each, Loops};
 use super::manage::{Manage, manage};
 use super::measure::Measure;
 use super::operator::Operator;
 use super::outputs::{self, Outputs};
-use super::particles::{RunError, SHOWN_SPANS, TRACED_SPANS, progress_bar};
+use super::particles::{SHOWN_SPANS, TRACED_SPANS};
 use super::pictures::Pictures;
+use super::progress;
 use super::recording::Recording;
 use super::report::{OperationReport, Report};
 use super::scenes::Patient;
@@ -127,7 +129,7 @@ fn run_unwatched<'c, 'h>(
     let look = |quality| look(surgery.region(), quality);
     let mut pictures = Pictures::new(&args.products, frames, look)?;
     let mut measure = Measure::new(Some(frames), count);
-    let bar = progress_bar(frames);
+    let bar = progress::of_frames(frames);
     let mut unwatched = NullRenderer::new();
     measure.start();
     while manager.frame() < frames {

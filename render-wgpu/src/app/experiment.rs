@@ -6,10 +6,10 @@ use std::path::Path;
 use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::machine::Machine;
 use dualframe_sim::experiment::{self, PAGE, Report};
-use indicatif::{ProgressBar, ProgressStyle};
 
 use super::args::ExperimentArgs;
 use super::outputs;
+use super::progress;
 
 /// Makes the folder and sees that it can be written to: an hour's run must not end in "no such
 /// folder".
@@ -22,7 +22,7 @@ pub(super) fn prepare(out: &Path) -> Result<(), String> {
 pub(super) fn run(args: &ExperimentArgs) -> Result<(), ExperimentError> {
     let (experiments, plan) = (args.experiments(), args.plan());
     let work = experiments.iter().map(|experiment| experiment.work(&plan)).sum();
-    let bar = progress_bar(work);
+    let bar = progress::of_work(work);
     let reports = experiment::run(&experiments, &plan, &args.out, &mut |experiment, done| {
         bar.set_message(experiment.name());
         bar.inc(done);
@@ -40,14 +40,4 @@ fn print(reports: &[Report], args: &ExperimentArgs, seed: u64) -> io::Result<()>
         writeln!(out, "{}: {}", figure.title, figure.finding)?;
     }
     writeln!(out, "see {}", args.out.join(PAGE).display())
-}
-
-/// Progress on standard error, if somebody looks at it.
-fn progress_bar(work: u64) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:40} {percent} % {msg}, {eta} left");
-    let bar = ProgressBar::new(work);
-    match style {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
-    }
 }

@@ -6,7 +6,7 @@ use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::scene::Scene;
 use dualframe_sim::timeline::Timeline;
 
-use super::particles::RunError;
+use super::error::RunError;
 
 /// Makes a manager of a scene, each time by the same settings.
 pub(super) type Manage<'a> = &'a dyn Fn(Scene) -> Result<VeManager, RunError>;

@@ -2,6 +2,7 @@
 
 mod args;
 mod craniotomy;
+mod error;
 mod experiment;
 mod haptics;
 mod manage;
@@ -10,6 +11,7 @@ mod operator;
 mod outputs;
 mod particles;
 mod pictures;
+mod progress;
 mod recording;
 mod replay;
 mod report;
@@ -22,8 +24,8 @@ use std::process::ExitCode;
 use dualframe_sim::device::thread::LoopError;
 
 use self::args::{CraniotomyArgs, ExperimentArgs, Outcome, Particles, ReplayArgs};
+use self::error::RunError;
 use self::outputs::Outputs;
-use self::particles::RunError;
 use self::report::Report;
 use self::scenes::Patient;
 

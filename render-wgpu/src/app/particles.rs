@@ -1,31 +1,25 @@
 //! `dualframe particles`.
 
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io::BufWriter;
 use std::sync::Arc;
 
 use dualframe_render_wgpu::camera::Camera;
-use dualframe_render_wgpu::error::GraphicsError;
 use dualframe_render_wgpu::look::Look;
 use dualframe_sim::blocking::Grain;
-use dualframe_sim::device::thread::LoopError;
-use dualframe_sim::executor::{ExecutorError, ExecutorKind, FrameRecord};
-use dualframe_sim::image::FileError;
+use dualframe_sim::executor::{ExecutorKind, FrameRecord};
 use dualframe_sim::manager::{Settings, VeManager};
-use dualframe_sim::record::RecordError;
 use dualframe_sim::render::{NullRenderer, Renderer};
-use dualframe_sim::scene::craniotomy::BuildError;
-use dualframe_sim::scene::head::HeadError;
 use dualframe_sim::scene::{ParticleScene, Scene, SceneError};
 use dualframe_sim::timeline::Timeline;
-use indicatif::{ProgressBar, ProgressStyle};
-use thiserror::Error;
 
 use super::AllocationCounter;
 use super::args::Particles;
+use super::error::RunError;
 use super::measure::Measure;
 use super::outputs::{self, Outputs};
 use super::pictures::Pictures;
+use super::progress;
 use super::recording::Recording;
 use super::report::Report;
 use super::window::{ParticlesAtHand, Session, most_threads};
@@ -36,32 +30,6 @@ const REFERENCE_FRAMES: u64 = 48;
 pub(super) const TRACED_SPANS: usize = 1 << 16;
 /// Spans of a worker that its timeline keeps for a window; usually 4,096, more than is shown.
 pub(super) const SHOWN_SPANS: usize = 1 << 12;
-
-/// Why a run failed.
-#[derive(Debug, Error)]
-pub(super) enum RunError {
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    #[error(transparent)]
-    Executor(#[from] ExecutorError),
-    #[error(transparent)]
-    Graphics(#[from] GraphicsError),
-    #[error("a picture cannot be written")]
-    Picture(#[source] io::Error),
-    #[error("the trace cannot be written")]
-    Trace(#[source] io::Error),
-    #[error(transparent)]
-    Record(#[from] RecordError),
-    #[error(transparent)]
-    Haptics(#[from] LoopError),
-    #[error(transparent)]
-    Operation(#[from] BuildError),
-    #[error("the image cannot be brought up to date")]
-    Drilled(#[from] HeadError),
-    // It says all that it comes from.
-    #[error("{0}")]
-    Image(FileError),
-}
 
 /// The environment that `args` describe, with another number of particles.
 pub(super) fn scene_of(args: &Particles, objects: usize) -> ParticleScene {
@@ -127,7 +95,7 @@ fn run_unwatched(
     let look = |quality| (Look::room(room, quality), Camera::around(&room));
     let mut pictures = Pictures::new(&args.products, frames, look)?;
     let mut measure = Measure::new(Some(frames), count);
-    let bar = progress_bar(frames);
+    let bar = progress::of_frames(frames);
     measure.start();
     let mut on_frame = |record: &FrameRecord| {
         measure.frame(record);
@@ -157,16 +125,6 @@ fn run_unwatched(
         }
     };
     Ok(report(args, &manager, &measure, speed_up))
-}
-
-/// Progress on standard error, if somebody looks at it.
-pub(super) fn progress_bar(frames: u64) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {per_sec}, {eta} left");
-    let bar = ProgressBar::new(frames);
-    match style {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
-    }
 }
 
 /// Seconds that the serial executor takes for the first frames of the same environment.

@@ -16,8 +16,8 @@ use dualframe_sim::object::Object;
 use dualframe_sim::render::Renderer;
 
 use super::args::Products;
+use super::error::RunError;
 use super::outputs;
-use super::particles::RunError;
 
 /// Pictures that wait to be written; usually 4.
 const WAITING: usize = 4;

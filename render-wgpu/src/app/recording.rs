@@ -7,8 +7,8 @@ use dualframe_sim::manager::VeManager;
 use dualframe_sim::record::{Control, Header, RecordError, Recorder, SceneSpec};
 use dualframe_sim::render::Renderer;
 
+use super::error::RunError;
 use super::outputs;
-use super::particles::RunError;
 
 /// Runs an environment, recorded if that was asked for.
 pub(super) struct Recording<'a>(Option<Recorder<&'a File>>);

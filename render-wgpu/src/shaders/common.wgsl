@@ -120,3 +120,8 @@ fn corner_of_box(index: u32) -> BoxCorner {
     normal[axis] = select(1.0, -1.0, high);
     return BoxCorner(share, normal);
 }
+
+// A vector turned by a quaternion.
+fn turned(rotation: vec4f, v: vec3f) -> vec3f {
+    return v + 2.0 * cross(rotation.xyz, cross(rotation.xyz, v) + rotation.w * v);
+}

@@ -30,10 +30,6 @@ fn vector(body: Instance, list: u32, node: u32) -> vec3f {
     return vec3f(numbers[at], numbers[at + body.nodes], numbers[at + 2u * body.nodes]);
 }
 
-fn turned(rotation: vec4f, v: vec3f) -> vec3f {
-    return v + 2.0 * cross(rotation.xyz, cross(rotation.xyz, v) + rotation.w * v);
-}
-
 fn place_of(body: Instance, node: u32) -> vec3f {
     return turned(body.rotation, vector(body, 0u, node)) + body.place;
 }

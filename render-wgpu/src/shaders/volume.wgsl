@@ -28,10 +28,6 @@ const SURFACE = 0.5;
 // What fills spongy bone.
 const MARROW = vec3f(0.50, 0.13, 0.08);
 
-fn turned(rotation: vec4f, v: vec3f) -> vec3f {
-    return v + 2.0 * cross(rotation.xyz, cross(rotation.xyz, v) + rotation.w * v);
-}
-
 // From the world to voxels: a direction.
 fn along_voxels(direction: vec3f) -> vec3f {
     return turned(vec4f(-grid.rotation.xyz, grid.rotation.w), direction) / grid.spacing;

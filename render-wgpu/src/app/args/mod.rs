@@ -150,10 +150,6 @@ impl Way {
         }
     }
 
-    fn entry(&self) -> Entry {
-        if self.frames_in_flight == 1 { Entry::AfterSwap } else { Entry::AfterUpdate }
-    }
-
     pub(in crate::app) fn simd(&self) -> Simd {
         self.simd.unwrap_or_else(Simd::detect)
     }
@@ -161,9 +157,14 @@ impl Way {
     /// `usual` is the scene's own broad phase.
     pub(in crate::app) fn settings(&self, usual: Grain) -> Settings {
         let Self { executor, threads, .. } = *self;
-        let (grain, entry) = (self.grain(usual), self.entry());
+        let (grain, entry) = (self.grain(usual), entry(self.frames_in_flight));
         Settings { executor, threads, pinned: false, grain, entry }
     }
+}
+
+/// How far consecutive frames overlap where so many are in flight at once.
+pub(in crate::app) fn entry(frames_in_flight: u8) -> Entry {
+    if frames_in_flight == 1 { Entry::AfterSwap } else { Entry::AfterUpdate }
 }
 
 /// Arguments of a replay.

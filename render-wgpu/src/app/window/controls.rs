@@ -1,7 +1,7 @@
 //! What the person at the window can change.
 
 use dualframe_render_wgpu::look::Coloring;
-use dualframe_sim::executor::{Entry, ExecutorKind, MAX_THREADS};
+use dualframe_sim::executor::{ExecutorKind, MAX_THREADS};
 use dualframe_sim::pool::cores;
 
 use crate::app::args::Way;
@@ -43,9 +43,5 @@ impl Controls {
             restarts: 0,
             is_shown: true,
         }
-    }
-
-    pub(super) fn entry(&self) -> Entry {
-        if self.frames_in_flight == 1 { Entry::AfterSwap } else { Entry::AfterUpdate }
     }
 }

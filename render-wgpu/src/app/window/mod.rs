@@ -38,9 +38,9 @@ pub(super) use self::craniotomy::CraniotomyAtHand;
 use self::hand::Hand;
 pub(super) use self::particles::ParticlesAtHand;
 use self::view::{Shown, View};
-use super::args::{Products, Way};
+use super::args::{Products, Way, entry};
+use super::error::RunError;
 use super::manage::{Manage, manage};
-use super::particles::RunError;
 use super::pictures;
 use super::recording::Recording;
 
@@ -251,8 +251,8 @@ impl<'a, S: Scenario> Session<'a, S> {
 
     /// What the person has set.
     fn settings(&self) -> Settings {
-        let Controls { executor, threads, .. } = self.applied;
-        let entry = self.applied.entry();
+        let Controls { executor, threads, frames_in_flight, .. } = self.applied;
+        let entry = entry(frames_in_flight);
         Settings { executor, threads, entry, ..self.way.settings(S::GRAIN) }
     }
 }

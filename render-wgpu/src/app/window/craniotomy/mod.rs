@@ -20,9 +20,9 @@ use super::Scenario;
 use super::view::View;
 use crate::app::args::CraniotomyArgs;
 use crate::app::craniotomy::{self, Surgery};
+use crate::app::error::RunError;
 use crate::app::haptics::{Each, Loops};
 use crate::app::manage::Manage;
-use crate::app::particles::RunError;
 use crate::app::recording::Recording;
 use crate::app::scenes::Patient;
 

@@ -19,8 +19,9 @@ use self::physics::Physics;
 use super::Scenario;
 use super::view::View;
 use crate::app::args::Particles;
+use crate::app::error::RunError;
 use crate::app::manage::Manage;
-use crate::app::particles::{self, RunError};
+use crate::app::particles;
 use crate::app::recording::Recording;
 
 /// The stiffness of springs to the centre over that of springs between nodes, in particles.

@@ -1,0 +1,39 @@
+//! What can go wrong with a run.
+
+use std::io;
+
+use dualframe_render_wgpu::error::GraphicsError;
+use dualframe_sim::device::thread::LoopError;
+use dualframe_sim::executor::ExecutorError;
+use dualframe_sim::image::FileError;
+use dualframe_sim::record::RecordError;
+use dualframe_sim::scene::SceneError;
+use dualframe_sim::scene::craniotomy::BuildError;
+use dualframe_sim::scene::head::HeadError;
+use thiserror::Error;
+
+/// Why a run failed.
+#[derive(Debug, Error)]
+pub(super) enum RunError {
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    Executor(#[from] ExecutorError),
+    #[error(transparent)]
+    Graphics(#[from] GraphicsError),
+    #[error("a picture cannot be written")]
+    Picture(#[source] io::Error),
+    #[error("the trace cannot be written")]
+    Trace(#[source] io::Error),
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    #[error(transparent)]
+    Haptics(#[from] LoopError),
+    #[error(transparent)]
+    Operation(#[from] BuildError),
+    #[error("the image cannot be brought up to date")]
+    Drilled(#[from] HeadError),
+    // It says all that it comes from.
+    #[error("{0}")]
+    Image(FileError),
+}
