@@ -16,6 +16,7 @@ use dualframe_sim::executor::FrameRecord;
 use dualframe_sim::geometry::{Bounds, Volume};
 use dualframe_sim::image;
 use dualframe_sim::manager::VeManager;
+use dualframe_sim::record::RecordError;
 use dualframe_sim::render::{NullRenderer, Renderer};
 use dualframe_sim::scene::Scene;
 use dualframe_sim::scene::craniotomy::{
@@ -38,18 +39,19 @@ use super::progress;
 use super::recording::Recording;
 use super::report::{OperationReport, Report};
 use super::scenes::Patient;
+use super::told::Told;
 use super::window::{CraniotomyAtHand, Session, most_threads};
 
 /// From how far the place of the operation is seen, over the size of its box.
 const DISTANCE: f32 = 1.4;
 
-/// Operates as `args` say. `note` is told what the person at the terminal should know.
+/// Operates as `args` say.
 pub(super) fn run(
     args: &CraniotomyArgs,
     patient: &Patient,
     outputs: &Outputs,
     count: AllocationCounter<'_>,
-    note: &dyn Fn(&str),
+    told: &Told,
 ) -> Result<Report, RunError> {
     let scene = patient.build(args.way.simd())?;
     let places = TOOLS.map(|tool| scene.objects[tool.0 as usize].center());
@@ -57,7 +59,7 @@ pub(super) fn run(
     // Haptic loops end with it.
     thread::scope(|scope| {
         let what = (args, patient, outputs);
-        run_beside(|| Ok(cells.start(scope, args.haptic_rate)?), links, scene, what, count, note)
+        run_beside(|| Ok(cells.start(scope, args.haptic_rate)?), links, scene, what, count, told)
     })
 }
 
@@ -68,7 +70,7 @@ fn run_beside<'c>(
     scene: Scene,
     (args, patient, outputs): (&CraniotomyArgs, &Patient, &Outputs),
     count: AllocationCounter<'_>,
-    note: &dyn Fn(&str),
+    told: &Told,
 ) -> Result<Report, RunError> {
     let settings = args.way.settings(Grain::Pairwise);
     let is_traced = outputs.trace.is_some();
@@ -80,14 +82,17 @@ fn run_beside<'c>(
     let how = (&args.way, &args.products);
     let window = match args.simulated_devices {
         true => None,
-        false => Session::open(at_hand, how, TIME_STEP, &timeline, note)?,
+        false => Session::open(at_hand, how, TIME_STEP, &timeline, told)?,
     };
     let is_watched = window.is_some() || is_traced;
     let manage = |scene| manage(scene, settings, is_watched.then_some(&timeline));
     let manager = manage(scene)?;
-    let recording = Recording::begin(outputs.record.as_ref(), patient.spec(), &manager)?;
+    let begin = |manager: &VeManager| {
+        Recording::begin(outputs.record.as_ref(), patient.spec(), manager, told)
+    };
     let (manager, surgery, measure) = match window {
         Some(window) => {
+            let recording = begin(&manager)?;
             let mut measure = Measure::new(args.frames, count);
             measure.start();
             let picture = outputs.picture.as_ref();
@@ -97,29 +102,29 @@ fn run_beside<'c>(
             (manager, at_hand.surgery, measure)
         }
         None => {
-            let how = (manager, recording, &manage as Manage<'_>);
-            run_unwatched(args, patient, outputs, links, how, count)?
+            let how = (manager, &manage as Manage<'_>);
+            run_unwatched((args, patient, outputs), links, how, begin, count, told)?
         }
     };
     if let Some(file) = &outputs.trace {
         let write = |writer: &mut BufWriter<&File>| timeline.write_chrome_trace(writer);
-        outputs::replace(file, write).map_err(RunError::Trace)?;
+        told.attempt(outputs::replace(file, write).map_err(RunError::Trace));
     }
     if let Some(path) = &args.save {
-        save(patient, &manager, path)?;
+        told.attempt(save(patient, &manager, path));
     }
     let report = Report::of("craniotomy", args.way.simd(), &manager, &measure);
     Ok(Report { operation: Some(surgery.report(&manager)), ..report })
 }
 
-/// Runs without a window: a script operates.
-fn run_unwatched<'c, 'h>(
-    args: &CraniotomyArgs,
-    patient: &Patient,
-    outputs: &Outputs,
+/// Runs without a window: a script operates. `begin` begins the recording.
+fn run_unwatched<'a, 'c, 'h>(
+    (args, patient, outputs): (&CraniotomyArgs, &Patient, &Outputs),
     links: &'h mut Each<HapticLink>,
-    (mut manager, mut recording, manage): (VeManager, Recording<'_>, Manage<'_>),
+    (mut manager, manage): (VeManager, Manage<'_>),
+    begin: impl FnOnce(&VeManager) -> Result<Recording<'a>, RecordError>,
     count: AllocationCounter<'c>,
+    told: &Told,
 ) -> Result<(VeManager, Surgery<'h>, Measure<'c>), RunError> {
     let mut surgery = Surgery::new(patient, Some(args.step.unwrap_or(Step::All)));
     if args.simulated_devices {
@@ -127,7 +132,8 @@ fn run_unwatched<'c, 'h>(
     }
     let frames = args.frames.unwrap_or_else(|| surgery.frames());
     let look = |quality| look(surgery.region(), quality);
-    let mut pictures = Pictures::new(&args.products, frames, look)?;
+    let mut pictures = Pictures::new(&args.products, frames, look, told)?;
+    let mut recording = begin(&manager)?;
     let mut measure = Measure::new(Some(frames), count);
     let bar = progress::of_frames(frames);
     let mut unwatched = NullRenderer::new();
@@ -147,10 +153,10 @@ fn run_unwatched<'c, 'h>(
         let how = (&mut on_frame as &mut dyn FnMut(&FrameRecord), manage);
         manager = surgery.advance(manager, &mut recording, left, renderer, how)?;
     }
-    recording.end(&manager)?;
+    recording.end(&manager);
     bar.finish_and_clear();
     if let Some(pictures) = pictures {
-        pictures.finish(outputs.picture.as_ref())?;
+        pictures.finish(outputs.picture.as_ref());
     }
     Ok((manager, surgery, measure))
 }
@@ -225,7 +231,7 @@ impl<'c> Surgery<'c> {
         self.devices = [0, 1].map(|hand| hands.device(hand));
         let (manager, freed) = self.operation.look(manager, manage)?;
         if freed > 0 {
-            recording.objects(&manager)?;
+            recording.objects(&manager);
             self.pieces += freed;
         }
         Ok(manager)

@@ -12,6 +12,8 @@ use dualframe_sim::scene::craniotomy::BuildError;
 use dualframe_sim::scene::head::HeadError;
 use thiserror::Error;
 
+use super::{BAD_ARGUMENT, NO_PICTURE, UNSOUND};
+
 /// Why a run failed.
 #[derive(Debug, Error)]
 pub(super) enum RunError {
@@ -25,8 +27,16 @@ pub(super) enum RunError {
     Picture(#[source] io::Error),
     #[error("the trace cannot be written")]
     Trace(#[source] io::Error),
+    #[error("cannot write the JSON")]
+    Json(#[source] io::Error),
     #[error(transparent)]
     Record(#[from] RecordError),
+    #[error("the recording ends before frame {frame}")]
+    Recording {
+        frame: u64,
+        #[source]
+        source: RecordError,
+    },
     #[error(transparent)]
     Haptics(#[from] LoopError),
     #[error(transparent)]
@@ -36,4 +46,15 @@ pub(super) enum RunError {
     // It says all that it comes from.
     #[error("{0}")]
     Image(FileError),
+}
+
+impl RunError {
+    /// The status that the program ends with.
+    pub(super) fn status(&self) -> u8 {
+        match self {
+            Self::Graphics(_) => NO_PICTURE,
+            Self::Haptics(LoopError::Rate { .. }) => BAD_ARGUMENT,
+            _ => UNSOUND,
+        }
+    }
 }

@@ -16,18 +16,18 @@ mod recording;
 mod replay;
 mod report;
 mod scenes;
+mod told;
 mod window;
 
 use std::error::Error;
 use std::process::ExitCode;
-
-use dualframe_sim::device::thread::LoopError;
 
 use self::args::{CraniotomyArgs, ExperimentArgs, Outcome, Particles, ReplayArgs};
 use self::error::RunError;
 use self::outputs::Outputs;
 use self::report::Report;
 use self::scenes::Patient;
+use self::told::Told;
 
 /// Counts the heap allocations made so far.
 pub(crate) type AllocationCounter<'a> = &'a dyn Fn() -> usize;
@@ -66,21 +66,21 @@ fn run_replay(args: &ReplayArgs) -> ExitCode {
         Ok(json) => json,
         Err(line) => return fail(&line, BAD_ARGUMENT),
     };
-    let told = |error| format!("{}: {}", args.file.display(), with_causes(error));
+    let line = |error| format!("{}: {}", args.file.display(), with_causes(error));
     let report = match replay::run(args) {
         Ok(report) => report,
-        Err(error) => return fail(&told(&error), BAD_ARGUMENT),
+        Err(error) => return fail(&line(&error), BAD_ARGUMENT),
     };
     report.print();
-    if let Some(json) = &json
-        && let Err(line) = report.write(json)
-    {
-        return fail(&line, UNSOUND);
+    let told = Told::default();
+    if let Some(json) = &json {
+        told.attempt(report.write(json));
     }
-    match &report.fault {
-        Some(fault) => fail(&told(fault), UNSOUND),
-        None => ExitCode::SUCCESS,
+    if let Some(fault) = &report.fault {
+        told.note(&line(fault));
+        told.end_with(UNSOUND);
     }
+    told.status()
 }
 
 fn run_particles(particles: &Particles, allocations: AllocationCounter<'_>) -> ExitCode {
@@ -88,13 +88,9 @@ fn run_particles(particles: &Particles, allocations: AllocationCounter<'_>) -> E
         Ok(outputs) => outputs,
         Err(line) => return fail(&line, BAD_ARGUMENT),
     };
-    let note = |line: &str| eprintln!("dualframe: {line}");
-    let report = match particles::run(particles, &outputs, allocations, &note) {
-        Ok(report) => report,
-        Err(RunError::Graphics(error)) => return fail(&with_causes(&error), NO_PICTURE),
-        Err(error) => return fail(&with_causes(&error), UNSOUND),
-    };
-    tell(&report, &outputs)
+    let told = Told::default();
+    let report = particles::run(particles, &outputs, allocations, &told);
+    end(report, &outputs, &told)
 }
 
 fn operate(args: &CraniotomyArgs, allocations: AllocationCounter<'_>) -> ExitCode {
@@ -110,26 +106,23 @@ fn operate(args: &CraniotomyArgs, allocations: AllocationCounter<'_>) -> ExitCod
         Ok(patient) => patient,
         Err(error) => return fail(&with_causes(&error), BAD_ARGUMENT),
     };
-    let note = |line: &str| eprintln!("dualframe: {line}");
-    match craniotomy::run(args, &patient, &outputs, allocations, &note) {
-        Ok(report) => tell(&report, &outputs),
-        Err(RunError::Graphics(error)) => fail(&with_causes(&error), NO_PICTURE),
-        Err(RunError::Haptics(error @ LoopError::Rate { .. })) => {
-            fail(&with_causes(&error), BAD_ARGUMENT)
-        }
-        Err(error) => fail(&with_causes(&error), UNSOUND),
-    }
+    let told = Told::default();
+    let report = craniotomy::run(args, &patient, &outputs, allocations, &told);
+    end(report, &outputs, &told)
 }
 
-/// Prints and writes a report.
-fn tell(report: &Report, outputs: &Outputs) -> ExitCode {
-    report.print();
-    if let Some(json) = &outputs.json
-        && let Err(line) = report.write(json)
-    {
-        return fail(&line, UNSOUND);
+/// Prints and writes what came of a run.
+fn end(report: Result<Report, RunError>, outputs: &Outputs, told: &Told) -> ExitCode {
+    if let Some(report) = told.attempt(report) {
+        report.print();
+        if let Some(json) = &outputs.json {
+            told.attempt(report.write(json));
+        }
+        if !report.is_sound() {
+            told.end_with(UNSOUND);
+        }
     }
-    if report.is_sound() { ExitCode::SUCCESS } else { ExitCode::from(UNSOUND) }
+    told.status()
 }
 
 /// An error and what it came from, in one line.

@@ -8,6 +8,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::args::Products;
+use super::error::RunError;
 use super::pictures::file_of_frame;
 
 /// The files that a run is to write; what is in them is not touched yet.
@@ -68,10 +69,10 @@ pub(super) fn replace<'a>(
 }
 
 /// Writes a file anew, as one JSON object.
-pub(super) fn write_json(file: &File, value: &impl Serialize) -> Result<(), String> {
+pub(super) fn write_json(file: &File, value: &impl Serialize) -> Result<(), RunError> {
     let written = replace(file, |writer| {
         serde_json::to_writer(&mut *writer, value)?;
         writer.write_all(b"\n")
     });
-    written.map_err(|error| format!("cannot write the JSON: {error}"))
+    written.map_err(RunError::Json)
 }

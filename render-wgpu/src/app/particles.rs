@@ -9,6 +9,7 @@ use dualframe_render_wgpu::look::Look;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::{ExecutorKind, FrameRecord};
 use dualframe_sim::manager::{Settings, VeManager};
+use dualframe_sim::record::RecordError;
 use dualframe_sim::render::{NullRenderer, Renderer};
 use dualframe_sim::scene::{ParticleScene, Scene, SceneError};
 use dualframe_sim::timeline::Timeline;
@@ -22,6 +23,7 @@ use super::pictures::Pictures;
 use super::progress;
 use super::recording::Recording;
 use super::report::Report;
+use super::told::Told;
 use super::window::{ParticlesAtHand, Session, most_threads};
 
 /// Frames that are run serially too, to say what the speed-up is.
@@ -42,12 +44,12 @@ fn build(args: &Particles) -> Result<Scene, SceneError> {
     Ok(scene)
 }
 
-/// Runs the environment as `args` say. `note` is told what the person at the terminal should know.
+/// Runs the environment as `args` say.
 pub(super) fn run(
     args: &Particles,
     outputs: &Outputs,
     count: AllocationCounter<'_>,
-    note: &dyn Fn(&str),
+    told: &Told,
 ) -> Result<Report, RunError> {
     let settings = args.way.settings(Grain::Spatial);
     let spans = if args.products.trace.is_some() { TRACED_SPANS } else { SHOWN_SPANS };
@@ -57,15 +59,14 @@ pub(super) fn run(
     let how = (&args.way, &args.products);
     let time_step = ParticleScene::TIME_STEP;
     let at_hand = || Ok(ParticlesAtHand::begin(args));
-    let window = Session::open(at_hand, how, time_step, &timeline, note)?;
+    let window = Session::open(at_hand, how, time_step, &timeline, told)?;
     let mut manager = VeManager::new(build(args)?, settings)?;
-    let spec = scene_of(args, args.objects);
-    let recording = Recording::begin(outputs.record.as_ref(), &spec, &manager)?;
     if window.is_some() || outputs.trace.is_some() {
         manager.watch(Arc::clone(&timeline));
     }
     let report = match window {
         Some(window) => {
+            let recording = begin_recording(args, outputs, &manager, told)?;
             let mut measure = Measure::new(args.frames, count);
             measure.start();
             let picture = outputs.picture.as_ref();
@@ -73,27 +74,38 @@ pub(super) fn run(
             let (manager, _) = window.run(manager, recording, args.frames, picture, on_frame)?;
             report(args, &manager, &measure, None)
         }
-        None => run_unwatched(args, outputs, (manager, recording), settings, count)?,
+        None => run_unwatched(args, outputs, manager, count, told)?,
     };
     if let Some(file) = &outputs.trace {
         let write = |writer: &mut BufWriter<&File>| timeline.write_chrome_trace(writer);
-        outputs::replace(file, write).map_err(RunError::Trace)?;
+        told.attempt(outputs::replace(file, write).map_err(RunError::Trace));
     }
     Ok(report)
+}
+
+fn begin_recording<'a>(
+    args: &Particles,
+    outputs: &'a Outputs,
+    manager: &VeManager,
+    told: &'a Told,
+) -> Result<Recording<'a>, RecordError> {
+    let spec = scene_of(args, args.objects);
+    Recording::begin(outputs.record.as_ref(), &spec, manager, told)
 }
 
 /// Runs without a window.
 fn run_unwatched(
     args: &Particles,
     outputs: &Outputs,
-    (mut manager, mut recording): (VeManager, Recording<'_>),
-    settings: Settings,
+    mut manager: VeManager,
     count: AllocationCounter<'_>,
+    told: &Told,
 ) -> Result<Report, RunError> {
     let frames = args.frames();
     let room = scene_of(args, args.objects).room();
     let look = |quality| (Look::room(room, quality), Camera::around(&room));
-    let mut pictures = Pictures::new(&args.products, frames, look)?;
+    let mut pictures = Pictures::new(&args.products, frames, look, told)?;
+    let mut recording = begin_recording(args, outputs, &manager, told)?;
     let mut measure = Measure::new(Some(frames), count);
     let bar = progress::of_frames(frames);
     measure.start();
@@ -109,28 +121,29 @@ fn run_unwatched(
         None => &mut unwatched,
     };
     recording.run(&mut manager, frames, renderer, &mut on_frame)?;
-    recording.end(&manager)?;
+    recording.end(&manager);
     bar.finish_and_clear();
     let is_drawn = pictures.is_some();
     if let Some(pictures) = pictures {
-        pictures.finish(outputs.picture.as_ref())?;
+        pictures.finish(outputs.picture.as_ref());
     }
+    let settings = manager.settings();
     let speed_up = match settings.executor {
         // Drawing is no part of the serial run.
         _ if is_drawn => None,
         ExecutorKind::Serial => Some(1.0),
         _ => {
-            let serial = serial_seconds(build(args)?, settings, frames)?;
-            Some(serial / measure.seconds_of_first(REFERENCE_FRAMES))
+            let serial = told.attempt(serial_seconds(args, settings, frames));
+            serial.map(|seconds| seconds / measure.seconds_of_first(REFERENCE_FRAMES))
         }
     };
     Ok(report(args, &manager, &measure, speed_up))
 }
 
 /// Seconds that the serial executor takes for the first frames of the same environment.
-fn serial_seconds(scene: Scene, settings: Settings, frames: u64) -> Result<f64, RunError> {
+fn serial_seconds(args: &Particles, settings: Settings, frames: u64) -> Result<f64, RunError> {
     let settings = Settings { executor: ExecutorKind::Serial, threads: 1, ..settings };
-    let mut manager = VeManager::new(scene, settings)?;
+    let mut manager = VeManager::new(build(args)?, settings)?;
     let frames = frames.min(REFERENCE_FRAMES);
     let mut measure = Measure::new(Some(frames), &|| 0);
     measure.start();

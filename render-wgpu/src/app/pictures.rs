@@ -18,31 +18,34 @@ use dualframe_sim::render::Renderer;
 use super::args::Products;
 use super::error::RunError;
 use super::outputs;
+use super::told::Told;
 
 /// Pictures that wait to be written; usually 4.
 const WAITING: usize = 4;
 
 /// Draws the frames that pictures are wanted of.
-pub(super) struct Pictures {
+pub(super) struct Pictures<'a> {
     offscreen: Offscreen,
     /// The frame being drawn.
     frame: u64,
     last: u64,
+    /// Whether frames are drawn of which no picture is wanted.
     draws_every: bool,
     sequence: Option<Sequence>,
     failure: Option<GraphicsError>,
+    told: &'a Told,
 }
 
-impl Pictures {
+impl<'a> Pictures<'a> {
     /// `None` if no pictures are wanted. `look` says what a picture of this quality looks like, and from
     /// where it is taken.
     pub(super) fn new(
         args: &Products,
         frames: u64,
         look: impl FnOnce(Quality) -> (Look, Camera),
+        told: &'a Told,
     ) -> Result<Option<Self>, RunError> {
-        let draws_every = args.offscreen || args.frames_out.is_some();
-        if !draws_every && args.picture.is_none() {
+        if !args.offscreen && args.frames_out.is_none() && args.picture.is_none() {
             return Ok(None);
         }
         let gpu = Gpu::new(args.adapter.as_deref())?;
@@ -57,30 +60,35 @@ impl Pictures {
             offscreen,
             frame: 0,
             last: frames - 1,
-            draws_every,
+            draws_every: args.offscreen,
             sequence: sequence.map_err(RunError::Picture)?,
             failure: None,
+            told,
         }))
     }
 
     fn is_wanted(&self) -> bool {
-        self.draws_every || self.frame == self.last
+        self.draws_every || self.sequence.is_some() || self.frame == self.last
     }
 
     /// Writes what is still to be written, the last frame's picture to `picture`.
-    pub(super) fn finish(mut self, picture: Option<&File>) -> Result<(), RunError> {
+    pub(super) fn finish(mut self, picture: Option<&File>) {
+        self.end_sequence();
+        let last = match self.failure.or_else(|| self.offscreen.painter.failure()) {
+            Some(failure) => Err(failure.into()),
+            None => picture.map_or(Ok(()), |file| write(self.offscreen.picture(), file)),
+        };
+        self.told.attempt(last);
+    }
+
+    fn end_sequence(&mut self) {
         if let Some(sequence) = self.sequence.take() {
-            sequence.finish().map_err(RunError::Picture)?;
+            self.told.attempt(sequence.finish().map_err(RunError::Picture));
         }
-        if let Some(failure) = self.failure.or_else(|| self.offscreen.painter.failure()) {
-            return Err(failure.into());
-        }
-        let Some(file) = picture else { return Ok(()) };
-        write(&self.offscreen.picture()?, file)
     }
 }
 
-impl Renderer for Pictures {
+impl Renderer for Pictures<'_> {
     fn draw(&mut self, object: &Object) {
         if self.is_wanted() {
             self.offscreen.draw(object);
@@ -94,7 +102,13 @@ impl Renderer for Pictures {
                 && self.failure.is_none()
             {
                 match self.offscreen.picture() {
-                    Ok(picture) => sequence.add(frame, picture),
+                    Ok(picture) => {
+                        let is_taken = sequence.add(frame, picture);
+                        // Without a writer no more pictures are drawn for it.
+                        if !is_taken {
+                            self.end_sequence();
+                        }
+                    }
                     Err(error) => self.failure = Some(error),
                 }
             }
@@ -104,7 +118,8 @@ impl Renderer for Pictures {
 }
 
 /// Writes a picture to a file of the outputs.
-pub(super) fn write(picture: &Picture, file: &File) -> Result<(), RunError> {
+pub(super) fn write(picture: Result<Picture, GraphicsError>, file: &File) -> Result<(), RunError> {
+    let picture = picture?;
     outputs::replace(file, |writer| picture.write_png(writer)).map_err(RunError::Picture)
 }
 
@@ -128,9 +143,9 @@ impl Sequence {
         Ok(Self { sender, writer, folder: folder.to_owned() })
     }
 
-    fn add(&self, frame: u64, picture: Picture) {
-        // A writer that has gone says at the end why.
-        let _ = self.sender.send((file_of_frame(&self.folder, frame), picture));
+    /// Whether there is still somebody who writes it.
+    fn add(&self, frame: u64, picture: Picture) -> bool {
+        self.sender.send((file_of_frame(&self.folder, frame), picture)).is_ok()
     }
 
     fn finish(self) -> io::Result<()> {

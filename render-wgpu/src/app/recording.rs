@@ -2,29 +2,35 @@
 
 use std::fs::File;
 
-use dualframe_sim::executor::FrameRecord;
+use dualframe_sim::executor::{ExecutorError, FrameRecord};
 use dualframe_sim::manager::VeManager;
 use dualframe_sim::record::{Control, Header, RecordError, Recorder, SceneSpec};
 use dualframe_sim::render::Renderer;
 
 use super::error::RunError;
 use super::outputs;
+use super::told::Told;
 
-/// Runs an environment, recorded if that was asked for.
-pub(super) struct Recording<'a>(Option<Recorder<&'a File>>);
+/// Runs an environment, recorded if that was asked for. A recording that fails ends, and the session goes on.
+pub(super) struct Recording<'a> {
+    recorder: Option<Recorder<&'a File>>,
+    told: &'a Told,
+}
 
 impl<'a> Recording<'a> {
-    /// Begins a recording, if there is a file for it, of an environment built as `spec` says.
+    /// Begins a recording, if there is a file for it, of an environment built as `spec` says. What is in the
+    /// file is gone then: nothing that can be refused may come after it.
     pub(super) fn begin(
         file: Option<&'a File>,
         spec: &impl SceneSpec,
         manager: &VeManager,
+        told: &'a Told,
     ) -> Result<Self, RecordError> {
         let begin = |file: &'a File| {
             outputs::empty(file)?;
             Recorder::begin(file, &Header::of(spec), manager)
         };
-        file.map(begin).transpose().map(Self)
+        Ok(Self { recorder: file.map(begin).transpose()?, told })
     }
 
     /// Advances by so many frames.
@@ -34,42 +40,53 @@ impl<'a> Recording<'a> {
         frames: u64,
         renderer: &mut dyn Renderer,
         on_frame: &mut dyn FnMut(&FrameRecord),
-    ) -> Result<(), RunError> {
-        match &mut self.0 {
-            Some(recorder) => recorder.run(manager, frames, renderer, on_frame)?,
-            None => manager.run(frames, renderer, on_frame)?,
+    ) -> Result<(), ExecutorError> {
+        let end = manager.frame() + frames;
+        if let Some(recorder) = &mut self.recorder {
+            match recorder.run(manager, frames, renderer, on_frame) {
+                Ok(()) => return Ok(()),
+                Err(RecordError::Executor(error)) => return Err(error),
+                Err(error) => self.fail(error, manager),
+            }
         }
-        Ok(())
+        manager.run(end - manager.frame(), renderer, on_frame)
     }
 
     /// Changes a number that all stages share.
-    pub(super) fn control(
-        &mut self,
-        manager: &mut VeManager,
-        control: Control,
-    ) -> Result<(), RecordError> {
-        match &mut self.0 {
-            Some(recorder) => recorder.control(manager, control),
-            None => {
-                control.apply(manager);
-                Ok(())
+    pub(super) fn control(&mut self, manager: &mut VeManager, control: Control) {
+        match &mut self.recorder {
+            Some(recorder) => {
+                let recorded = recorder.control(manager, control);
+                self.check(recorded, manager);
             }
+            None => control.apply(manager),
         }
     }
 
     /// Objects were added that follow from the environment's state.
-    pub(super) fn objects(&mut self, manager: &VeManager) -> Result<(), RecordError> {
-        match &mut self.0 {
-            Some(recorder) => recorder.objects(manager, &[]),
-            None => Ok(()),
+    pub(super) fn objects(&mut self, manager: &VeManager) {
+        if let Some(recorder) = &mut self.recorder {
+            let recorded = recorder.objects(manager, &[]);
+            self.check(recorded, manager);
         }
     }
 
     /// Ends the recording; whether there was one.
-    pub(super) fn end(&mut self, manager: &VeManager) -> Result<bool, RecordError> {
-        let recorder = self.0.take();
-        let is_recorded = recorder.is_some();
-        recorder.map(|recorder| recorder.finish(manager)).transpose()?;
-        Ok(is_recorded)
+    pub(super) fn end(&mut self, manager: &VeManager) -> bool {
+        let Some(recorder) = self.recorder.take() else { return false };
+        let ended = recorder.finish(manager).map(drop);
+        self.check(ended, manager);
+        true
+    }
+
+    fn check(&mut self, recorded: Result<(), RecordError>, manager: &VeManager) {
+        if let Err(error) = recorded {
+            self.fail(error, manager);
+        }
+    }
+
+    fn fail(&mut self, source: RecordError, manager: &VeManager) {
+        self.recorder = None;
+        self.told.failure(&RunError::Recording { frame: manager.frame(), source });
     }
 }

@@ -13,6 +13,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::args::ReplayArgs;
+use super::error::RunError;
 use super::outputs;
 use super::scenes::{AnyScene, AnySceneError};
 
@@ -182,7 +183,7 @@ impl ReplayReport {
     }
 
     /// Writes the report as one JSON object.
-    pub(super) fn write(&self, file: &File) -> Result<(), String> {
+    pub(super) fn write(&self, file: &File) -> Result<(), RunError> {
         outputs::write_json(file, self)
     }
 }

@@ -10,6 +10,7 @@ use dualframe_sim::scene::craniotomy;
 use dualframe_sim::simd::Simd;
 use serde::{Serialize, Serializer};
 
+use super::error::RunError;
 use super::haptics::HapticsReport;
 use super::measure::Measure;
 use super::outputs;
@@ -222,7 +223,7 @@ impl Report {
     }
 
     /// Writes the report as one JSON object.
-    pub(super) fn write(&self, file: &File) -> Result<(), String> {
+    pub(super) fn write(&self, file: &File) -> Result<(), RunError> {
         outputs::write_json(file, self)
     }
 

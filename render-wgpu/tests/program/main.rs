@@ -3,6 +3,7 @@
 
 mod command;
 mod craniotomy;
+mod outputs;
 mod replay;
 mod report;
 mod window;

@@ -43,6 +43,7 @@ use super::error::RunError;
 use super::manage::{Manage, manage};
 use super::pictures;
 use super::recording::Recording;
+use super::told::Told;
 
 /// How long a run of frames takes, about; usually 50 ms: so late may controls take effect.
 const RUN_SECONDS: f32 = 0.05;
@@ -91,8 +92,7 @@ pub(super) struct Session<'a, S: Scenario> {
     /// What the environment was last told.
     applied: Controls,
     way: &'a Way,
-    /// Is told what the person at the terminal should know.
-    note: &'a dyn Fn(&str),
+    told: &'a Told,
 }
 
 impl<'a, S: Scenario> Session<'a, S> {
@@ -106,7 +106,7 @@ impl<'a, S: Scenario> Session<'a, S> {
         (way, products): (&'a Way, &Products),
         time_step: f32,
         timeline: &Arc<Timeline>,
-        note: &'a dyn Fn(&str),
+        told: &'a Told,
     ) -> Result<Option<Self>, RunError> {
         if !products.prefers_window() {
             return Ok(None);
@@ -121,10 +121,10 @@ impl<'a, S: Scenario> Session<'a, S> {
         };
         let look = |quality| scenario.look(quality);
         match View::open(shown, look, products.adapter.as_deref(), controls) {
-            Ok(view) => Ok(Some(Self { scenario, view, applied: controls, way, note })),
+            Ok(view) => Ok(Some(Self { scenario, view, applied: controls, way, told })),
             Err(error) if products.window => Err(error.into()),
             Err(error) => {
-                note(&format!(
+                told.note(&format!(
                     "running without a window, since {error}; --picture FILE.png draws without one"
                 ));
                 Ok(None)
@@ -136,7 +136,7 @@ impl<'a, S: Scenario> Session<'a, S> {
     /// environment as it is then, and the scenario.
     ///
     /// # Errors
-    /// The executor cannot go on, or the window can no longer be drawn to.
+    /// The executor cannot go on.
     pub(super) fn run(
         mut self,
         mut manager: VeManager,
@@ -162,14 +162,16 @@ impl<'a, S: Scenario> Session<'a, S> {
             manager = self.advance(manager, &mut recording, wanted.min(left), on_frame)?;
             left -= manager.frame() - before;
         }
-        recording.end(&manager)?;
-        if let Some(failure) = self.view.failure() {
-            return Err(failure.into());
-        }
-        if let Some(file) = picture {
-            self.take(&manager);
-            pictures::write(&self.view.picture()?, file)?;
-        }
+        recording.end(&manager);
+        let drawn = match (self.view.failure(), picture) {
+            (Some(failure), _) => Err(failure.into()),
+            (None, Some(file)) => {
+                self.take(&manager);
+                pictures::write(self.view.picture(), file)
+            }
+            (None, None) => Ok(()),
+        };
+        self.told.attempt(drawn);
         Ok((manager, self.scenario))
     }
 
@@ -219,9 +221,9 @@ impl<'a, S: Scenario> Session<'a, S> {
         let (now, before) = (self.view.controls, self.applied);
         self.applied = now;
         if now.restarts != before.restarts {
-            if recording.end(&manager)? {
+            if recording.end(&manager) {
                 let frame = manager.frame();
-                (self.note)(&format!("the recording ends before frame {frame}: started anew"));
+                self.told.note(&format!("the recording ends before frame {frame}: started anew"));
             }
             manager = self.restart()?;
         }

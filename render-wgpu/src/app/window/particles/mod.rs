@@ -79,7 +79,7 @@ impl Scenario for ParticlesAtHand<'_> {
         let (now, before) = (hand.physics, self.applied);
         self.applied = now;
         if now.gravity != before.gravity {
-            recording.control(manager, Control::Gravity(Vec3::NEG_Y * now.gravity))?;
+            recording.control(manager, Control::Gravity(Vec3::NEG_Y * now.gravity));
         }
         if now.stiffness != before.stiffness {
             let (between_nodes, to_center) = (now.stiffness, now.stiffness * CENTER_STIFFNESS);
