@@ -118,20 +118,24 @@ pub(super) fn run(args: &ReplayArgs) -> Result<ReplayReport, ReplayFault> {
             }
             Ok(Step::Objects(spec)) => {
                 let mut scene = manager.into_scene();
-                any.add(&mut scene, &spec)?;
+                let added = any.add(&mut scene, &spec);
                 manager = VeManager::new(scene, args.way.settings(any.grain()))?;
+                if let Err(error) = added {
+                    break (manager, Some(error.into()));
+                }
             }
             Err(error) => break (manager, Some(error.into())),
         }
     };
     let seconds = began.elapsed().as_secs_f64();
     bar.finish_and_clear();
-    if manager.frame() == 0
-        && let Some(ReplayFault::Replay(ReplayError::Recording(error))) = fault
-    {
-        return Err(error.into());
+    match fault {
+        Some(ReplayFault::Replay(ReplayError::Recording(error))) if manager.frame() == 0 => {
+            Err(error.into())
+        }
+        Some(fault @ ReplayFault::Scene(_)) if manager.frame() == 0 => Err(fault),
+        fault => Ok(report(args, (&any, &replay, &manager), seconds, fault)),
     }
-    Ok(report(args, (&any, &replay, &manager), seconds, fault))
 }
 
 fn report(

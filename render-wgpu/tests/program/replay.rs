@@ -125,6 +125,37 @@ fn another_session_is_told_by_its_objects() {
     assert_ne!(difference["expected"], difference["found"]);
 }
 
+#[test]
+fn what_comes_before_objects_that_cannot_be_added_is_played() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (file, json) = (folder.path().join("session"), folder.path().join("replay.json"));
+    let [text, json_text] = [&file, &json].map(|path| path.to_str().expect("a plain path"));
+    let replay = ["replay", text, "--json", json_text];
+    let spec = ParticleScene::new(5);
+    let record = |frames| {
+        let scene = spec.build().expect("a valid scene");
+        let mut manager = VeManager::new(scene, Settings::default()).expect("valid settings");
+        let file = fs::File::create(&file).expect("it can be written");
+        let mut recorder = Recorder::begin(file, &Header::of(&spec), &manager).expect("a start");
+        let renderer = &mut NullRenderer::new();
+        recorder.run(&mut manager, frames, renderer, &mut |_| {}).expect("it runs");
+        // Particles are never added to.
+        recorder.objects(&manager, &[]).expect("it is recorded");
+        recorder.run(&mut manager, 5, renderer, &mut |_| {}).expect("it runs");
+        recorder.finish(&manager).expect("it is written");
+    };
+    record(70);
+    let output = run(&replay);
+    told(&output, 1, "particles");
+    assert!(String::from_utf8_lossy(&output.stdout).contains("70 frames replayed"));
+    let replayed = read_json(&json);
+    assert_eq!((&replayed["frames"], &replayed["agrees"]), (&70.into(), &false.into()));
+    record(0);
+    let output = run(&replay);
+    told(&output, 2, "particles");
+    assert!(output.stdout.is_empty());
+}
+
 struct Unknown;
 
 impl SceneSpec for Unknown {
