@@ -88,14 +88,14 @@ fn run_beside<'c>(
     let manage = |scene| manage(scene, settings, is_watched.then_some(&timeline));
     let manager = manage(scene)?;
     let begin = |manager: &VeManager| {
-        Recording::begin(outputs.record.as_ref(), patient.spec(), manager, told)
+        Recording::begin(outputs.record.as_deref(), patient.spec(), manager, told)
     };
     let (manager, surgery, measure) = match window {
         Some(window) => {
             let recording = begin(&manager)?;
             let mut measure = Measure::new(args.frames, count);
             measure.start();
-            let picture = outputs.picture.as_ref();
+            let picture = outputs.picture.as_deref();
             let on_frame = &mut |record: &FrameRecord| measure.frame(record);
             let (manager, at_hand) =
                 window.run(manager, recording, args.frames, picture, on_frame)?;
@@ -110,8 +110,8 @@ fn run_beside<'c>(
         let write = |writer: &mut BufWriter<&File>| timeline.write_chrome_trace(writer);
         told.attempt(outputs::replace(file, write).map_err(RunError::Trace));
     }
-    if let Some(path) = &args.save {
-        told.attempt(save(patient, &manager, path));
+    if let Some(output) = &outputs.save {
+        told.attempt(save(patient, &manager, output.path()));
     }
     let report = Report::of("craniotomy", args.way.simd(), &manager, &measure);
     Ok(Report { operation: Some(surgery.report(&manager)), ..report })
@@ -156,7 +156,7 @@ fn run_unwatched<'a, 'c, 'h>(
     recording.end(&manager);
     bar.finish_and_clear();
     if let Some(pictures) = pictures {
-        pictures.finish(outputs.picture.as_ref());
+        pictures.finish(outputs.picture.as_deref());
     }
     Ok((manager, surgery, measure))
 }

@@ -8,14 +8,14 @@ use dualframe_sim::experiment::machine::Machine;
 use dualframe_sim::experiment::{self, PAGE, Report};
 
 use super::args::ExperimentArgs;
-use super::outputs;
+use super::outputs::{Output, make_folder};
 use super::progress;
 
 /// Makes the folder and sees that it can be written to: an hour's run must not end in "no such
 /// folder".
 pub(super) fn prepare(out: &Path) -> Result<(), String> {
-    outputs::make_folder(out)?;
-    outputs::open(&out.join(PAGE)).map(drop)
+    make_folder(out)?;
+    Output::open(&out.join(PAGE)).map(drop)
 }
 
 /// Runs the experiments that `args` ask for.

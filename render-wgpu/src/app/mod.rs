@@ -24,7 +24,7 @@ use std::process::ExitCode;
 
 use self::args::{CraniotomyArgs, ExperimentArgs, Outcome, Particles, ReplayArgs};
 use self::error::RunError;
-use self::outputs::Outputs;
+use self::outputs::{Output, Outputs};
 use self::report::Report;
 use self::scenes::Patient;
 use self::told::Told;
@@ -62,12 +62,12 @@ fn run_experiments(args: &ExperimentArgs) -> ExitCode {
 }
 
 fn run_replay(args: &ReplayArgs) -> ExitCode {
-    let json = match args.json.as_deref().map(outputs::open).transpose() {
+    let json = match args.json.as_deref().map(Output::open).transpose() {
         Ok(json) => json,
         Err(line) => return fail(&line, BAD_ARGUMENT),
     };
     let line = |error| format!("{}: {}", args.file.display(), with_causes(error));
-    let report = match replay::run(args) {
+    let report = match replay::run(args, json.as_ref()) {
         Ok(report) => report,
         Err(error) => return fail(&line(&error), BAD_ARGUMENT),
     };
@@ -84,7 +84,7 @@ fn run_replay(args: &ReplayArgs) -> ExitCode {
 }
 
 fn run_particles(particles: &Particles, allocations: AllocationCounter<'_>) -> ExitCode {
-    let outputs = match Outputs::open(&particles.products) {
+    let outputs = match Outputs::open(&particles.products, None, None) {
         Ok(outputs) => outputs,
         Err(line) => return fail(&line, BAD_ARGUMENT),
     };
@@ -94,14 +94,11 @@ fn run_particles(particles: &Particles, allocations: AllocationCounter<'_>) -> E
 }
 
 fn operate(args: &CraniotomyArgs, allocations: AllocationCounter<'_>) -> ExitCode {
-    let outputs = match Outputs::open(&args.products) {
+    let (save, input) = (args.save.as_deref(), args.ct.as_deref());
+    let outputs = match Outputs::open(&args.products, save, input) {
         Ok(outputs) => outputs,
         Err(line) => return fail(&line, BAD_ARGUMENT),
     };
-    // It is written anew at the end; that it can be is known now.
-    if let Err(line) = args.save.as_deref().map(outputs::open).transpose() {
-        return fail(&line, BAD_ARGUMENT);
-    }
     let patient = match Patient::new(args.ct.as_deref()) {
         Ok(patient) => patient,
         Err(error) => return fail(&with_causes(&error), BAD_ARGUMENT),

@@ -1,9 +1,12 @@
 //! The files that a run is to write. They are opened before any work is done: an hour's run must not end
 //! in "no such folder".
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::fs::{self, File, Metadata, OpenOptions};
+use std::io::{self, BufWriter, ErrorKind, Write};
+use std::ops::Deref;
+#[cfg(unix)]
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -13,33 +16,113 @@ use super::pictures::file_of_frame;
 
 /// The files that a run is to write; what is in them is not touched yet.
 pub(super) struct Outputs {
-    pub(super) json: Option<File>,
-    pub(super) picture: Option<File>,
-    pub(super) trace: Option<File>,
-    pub(super) record: Option<File>,
+    pub(super) json: Option<Output>,
+    pub(super) picture: Option<Output>,
+    pub(super) trace: Option<Output>,
+    pub(super) record: Option<Output>,
+    /// Where an image is saved.
+    pub(super) save: Option<Output>,
 }
 
 impl Outputs {
-    /// Opens what `args` name, and makes the folder for the pictures of all frames.
-    pub(super) fn open(args: &Products) -> Result<Self, String> {
+    /// Opens `save` and what `args` name, none of which may be `input`, and makes the folder for the pictures
+    /// of all frames.
+    pub(super) fn open(
+        args: &Products,
+        save: Option<&Path>,
+        input: Option<&Path>,
+    ) -> Result<Self, String> {
         if let Some(folder) = &args.frames_out {
             make_folder(folder)?;
-            open(&file_of_frame(folder, 0))?;
+            Output::open(&file_of_frame(folder, 0))?;
         }
-        let open = |path: &Option<_>| path.as_deref().map(open).transpose();
-        Ok(Self {
-            json: open(&args.json)?,
-            picture: open(&args.picture)?,
-            trace: open(&args.trace)?,
-            record: open(&args.record)?,
-        })
+        let open = |path: Option<&Path>| path.map(Output::open).transpose();
+        let outputs = Self {
+            json: open(args.json.as_deref())?,
+            picture: open(args.picture.as_deref())?,
+            trace: open(args.trace.as_deref())?,
+            record: open(args.record.as_deref())?,
+            save: open(save)?,
+        };
+        let Self { json, picture, trace, record, save } = &outputs;
+        let written = [json, picture, trace, record, save].into_iter().flatten();
+        check_distinct(written.map(Output::path).chain(input))?;
+        Ok(outputs)
     }
 }
 
-/// Opens a file that will be written, without touching what is in it yet.
-pub(super) fn open(path: &Path) -> Result<File, String> {
-    let opened = OpenOptions::new().write(true).create(true).truncate(false).open(path);
-    opened.map_err(|error| format!("cannot write {}: {error}", path.display()))
+/// A file that will be written. One that was not there before goes if nothing was written.
+pub(super) struct Output {
+    file: File,
+    path: PathBuf,
+    is_new: bool,
+}
+
+impl Output {
+    /// Opens it, without touching what is in it yet.
+    pub(super) fn open(path: &Path) -> Result<Self, String> {
+        let open = |is_new: bool| {
+            let mut options = OpenOptions::new();
+            options.write(true).create(!is_new).create_new(is_new).truncate(false).open(path)
+        };
+        let (opened, is_new) = match open(true) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => (open(false), false),
+            opened => (opened, true),
+        };
+        let file = opened.map_err(|error| format!("cannot write {}: {error}", path.display()))?;
+        Ok(Self { file, path: path.to_owned(), is_new })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Deref for Output {
+    type Target = File;
+
+    fn deref(&self) -> &File {
+        &self.file
+    }
+}
+
+impl Drop for Output {
+    fn drop(&mut self) {
+        let is_empty = |found: Metadata| found.is_file() && found.len() == 0;
+        if self.is_new && fs::symlink_metadata(&self.path).is_ok_and(is_empty) {
+            // At worst an empty file stays.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Sees that no two of some files are the same one: what is in it would be lost.
+pub(super) fn check_distinct<'a>(paths: impl Iterator<Item = &'a Path>) -> Result<(), String> {
+    let mut known: Vec<(&Path, Identity)> = Vec::new();
+    for path in paths {
+        let Some(identity) = identity(path) else { continue };
+        if let Some((same, _)) = known.iter().find(|(_, known)| *known == identity) {
+            let (one, other) = (same.display(), path.display());
+            return Err(format!("{one} and {other} are the same file"));
+        }
+        known.push((path, identity));
+    }
+    Ok(())
+}
+
+/// What a file is told from others by: its device and number.
+#[cfg(unix)]
+type Identity = (u64, u64);
+#[cfg(not(unix))]
+type Identity = PathBuf;
+
+/// `None` for what is no file: several may write to a pipe or a device.
+fn identity(path: &Path) -> Option<Identity> {
+    let found = fs::metadata(path).ok().filter(Metadata::is_file)?;
+    #[cfg(unix)]
+    return Some((MetadataExt::dev(&found), MetadataExt::ino(&found)));
+    #[cfg(not(unix))]
+    return fs::canonicalize(path).ok().filter(|_| found.is_file());
 }
 
 /// Makes a folder if it is not there.

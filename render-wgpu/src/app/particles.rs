@@ -69,7 +69,7 @@ pub(super) fn run(
             let recording = begin_recording(args, outputs, &manager, told)?;
             let mut measure = Measure::new(args.frames, count);
             measure.start();
-            let picture = outputs.picture.as_ref();
+            let picture = outputs.picture.as_deref();
             let on_frame = &mut |record: &FrameRecord| measure.frame(record);
             let (manager, _) = window.run(manager, recording, args.frames, picture, on_frame)?;
             report(args, &manager, &measure, None)
@@ -90,7 +90,7 @@ fn begin_recording<'a>(
     told: &'a Told,
 ) -> Result<Recording<'a>, RecordError> {
     let spec = scene_of(args, args.objects);
-    Recording::begin(outputs.record.as_ref(), &spec, manager, told)
+    Recording::begin(outputs.record.as_deref(), &spec, manager, told)
 }
 
 /// Runs without a window.
@@ -125,7 +125,7 @@ fn run_unwatched(
     bar.finish_and_clear();
     let is_drawn = pictures.is_some();
     if let Some(pictures) = pictures {
-        pictures.finish(outputs.picture.as_ref());
+        pictures.finish(outputs.picture.as_deref());
     }
     let settings = manager.settings();
     let speed_up = match settings.executor {

@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, BufReader, Write};
+use std::path::Path;
 use std::time::Instant;
 
 use dualframe_sim::executor::ExecutorError;
@@ -14,7 +15,7 @@ use thiserror::Error;
 
 use super::args::ReplayArgs;
 use super::error::RunError;
-use super::outputs;
+use super::outputs::{self, Output};
 use super::scenes::{AnyScene, AnySceneError};
 
 /// Why nothing of a recording can be played, or not all.
@@ -30,6 +31,9 @@ pub(super) enum ReplayFault {
     Executor(#[from] ExecutorError),
     #[error(transparent)]
     Replay(#[from] ReplayError),
+    /// What is to be written is what it is played from.
+    #[error("{0}")]
+    Output(String),
 }
 
 /// What came of a replay.
@@ -94,14 +98,20 @@ impl From<&Difference> for DifferenceReport {
     }
 }
 
-/// Replays a recording as `args` say.
+/// Replays a recording as `args` say. `json` is what is written afterwards.
 ///
 /// # Errors
 /// Nothing of it can be played.
-pub(super) fn run(args: &ReplayArgs) -> Result<ReplayReport, ReplayFault> {
+pub(super) fn run(args: &ReplayArgs, json: Option<&Output>) -> Result<ReplayReport, ReplayFault> {
+    let check = |input: Option<&Path>| {
+        let files = json.map(Output::path).into_iter().chain(input);
+        outputs::check_distinct(files).map_err(ReplayFault::Output)
+    };
+    check(Some(&args.file))?;
     let file = File::open(&args.file).map_err(ReplayFault::Open)?;
     let mut replay = Replay::new(BufReader::new(file))?;
     let any = AnyScene::of(replay.header())?;
+    check(any.input())?;
     let mut scene = any.build(args.way.simd())?;
     replay.begin(&mut scene);
     let mut manager = VeManager::new(scene, args.way.settings(any.grain()))?;

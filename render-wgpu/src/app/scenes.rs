@@ -56,6 +56,14 @@ impl AnyScene {
         }
     }
 
+    /// The file that it is built from, besides the recording.
+    pub(super) fn input(&self) -> Option<&Path> {
+        match self {
+            Self::Particles(_) => None,
+            Self::Craniotomy(patient) => patient.spec.ct.as_ref().map(|(file, _)| Path::new(file)),
+        }
+    }
+
     /// The broad phase that fits it.
     pub(super) fn grain(&self) -> Grain {
         match self {

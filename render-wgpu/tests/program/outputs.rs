@@ -3,12 +3,14 @@
 
 use std::fs::{self, File};
 use std::io::Read;
+use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::{Command, Output};
 use std::thread;
 
 use crate::command::{read_json, run, told};
-use dualframe_sim::image::Image;
+use dualframe_sim::image::{Image, save};
+use dualframe_sim::scene::head::synthetic_ct;
 use tempfile::TempDir;
 
 /// Nothing can be written there.
@@ -41,15 +43,16 @@ fn failed(output: &Output, parts: &[&str]) {
 #[test]
 fn what_fails_costs_no_other_output() {
     let folder = Folder::new();
-    let [json, save, record] =
+    let [json, after, record] =
         ["report.json", "after.nii", "session"].map(|name| folder.file(name));
     let operate = |args: &[&str]| {
         run(&[&["craniotomy", "--step", "incision", "--frames", "3", "--headless"], args].concat())
     };
-    let output = operate(&["--trace", FULL, "--save", &save, "--json", &json, "--record", &record]);
+    let output =
+        operate(&["--trace", FULL, "--save", &after, "--json", &json, "--record", &record]);
     failed(&output, &["the trace cannot be written: "]);
     assert_eq!(read_json(json.as_ref())["frames"], 3);
-    Image::open(save.as_ref()).expect("it was written");
+    Image::open(after.as_ref()).expect("it was written");
     assert!(run(&["replay", &record]).status.success());
 
     fs::remove_file(&json).expect("it was there");
@@ -127,4 +130,70 @@ fn a_refused_run_keeps_a_recording() {
     let hands = ["craniotomy", "--simulated-devices", "--haptic-rate", "100", "--record", &record];
     told(&run(&hands), 2, "500 to 4000 Hz");
     assert_eq!(fs::read_to_string(&record).ok().as_deref(), Some("precious"));
+}
+
+#[test]
+fn a_file_is_not_two() {
+    let folder = Folder::new();
+    let [recording, other, link, image] =
+        ["session", "other", "link", "ct.nii"].map(|name| folder.file(name));
+    let few = ["--headless", "--objects", "5", "--frames", "5"];
+    assert!(run(&[&few[..], &["--record", &recording]].concat()).status.success());
+    let before = fs::read(&recording).expect("it was written");
+    symlink(&recording, &link).expect("it can be made");
+    for json in [&recording, &link] {
+        told(&run(&["replay", &recording, "--json", json]), 2, "are the same file");
+        let both = ["--record", &recording, "--json", json];
+        told(&run(&[&few[..], &both].concat()), 2, "are the same file");
+    }
+    assert!(fs::read(&recording).is_ok_and(|now| now == before));
+    // One that is not there yet.
+    told(&run(&["--json", &other, "--trace", &other]), 2, "are the same file");
+    assert!(!Path::new(&other).exists());
+    // An image, of a recording too.
+    let image_of = synthetic_ct().expect("it has no file");
+    save(image.as_ref(), image_of.grid(), image_of.voxels()).expect("it can be written");
+    let before = fs::read(&image).expect("it was written");
+    told(&run(&["craniotomy", "--ct", &image, "--save", &image]), 2, "are the same file");
+    let few = ["craniotomy", "--headless", "--frames", "2", "--ct", &image];
+    assert!(run(&[&few[..], &["--record", &recording]].concat()).status.success());
+    told(&run(&["replay", &recording, "--json", &image]), 2, "are the same file");
+    assert!(fs::read(&image).is_ok_and(|now| now == before));
+    // More than one may write to a device.
+    let output =
+        run(&["--headless", "--frames", "5", "--json", "/dev/null", "--trace", "/dev/null"]);
+    assert!(output.status.success());
+}
+
+#[test]
+fn nothing_is_left_of_a_refused_run() {
+    let folder = Folder::new();
+    let [json, trace, picture, recording, image, pictures] =
+        ["json", "trace", "picture", "session", "after.nii", "frames"]
+            .map(|name| folder.file(name));
+    let files = ["--json", &json, "--trace", &trace, "--picture", &picture];
+    let recorded = [&files[..], &["--record", &recording]].concat();
+    let nowhere = ["--record", "/no/such/folder/session"];
+    let frames = ["--frames-out", &pictures, "--adapter", "nonsense"];
+    let save = ["--save", &image, "--ct", "/no/such/image"];
+    let refused: [(&[&str], i32); 5] = [
+        (&[&files[..], &nowhere].concat(), 2),
+        (&[&recorded[..], &["--adapter", "nonsense"]].concat(), 3),
+        (&[&recorded[..], &frames].concat(), 3),
+        (&[&["craniotomy"], &recorded[..], &save].concat(), 2),
+        (&["replay", "/no/such/recording", "--json", &json], 2),
+    ];
+    for (args, status) in refused {
+        assert_eq!(run(args).status.code(), Some(status), "{args:?}");
+        let left = fs::read_dir(folder.0.path()).expect("it is there").flatten();
+        let left: Vec<_> =
+            left.map(|entry| entry.file_name()).filter(|name| name != "frames").collect();
+        assert!(left.is_empty(), "{args:?} leaves {left:?}");
+    }
+    let mut left = fs::read_dir(&pictures).expect("it was made");
+    assert!(left.next().is_none());
+    // What was there stays, be it empty.
+    fs::write(&json, "").expect("it can be written");
+    run(&["replay", "/no/such/recording", "--json", &json]);
+    assert!(Path::new(&json).exists());
 }
