@@ -1,5 +1,6 @@
 //! `dualframe craniotomy`.
 
+use std::cell::Cell;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
@@ -29,7 +30,7 @@ use super::AllocationCounter;
 use super::args::CraniotomyArgs;
 use super::error::RunError;
 use super::haptics::{Cells, Each, Loops};
-use super::manage::{Manage, manage};
+use super::manage::{Manage, Spent, manage};
 use super::measure::Measure;
 use super::operator::Operator;
 use super::outputs::{self, Outputs};
@@ -80,9 +81,10 @@ fn run_beside<'c>(
     let timeline = Arc::new(Timeline::new(workers, spans));
     let at_hand = || Ok(CraniotomyAtHand::begin(args, patient, start()?));
     let how = (&args.way, &args.products);
+    let spent = Spent::default();
     let window = match args.simulated_devices {
         true => None,
-        false => Session::open(at_hand, how, TIME_STEP, &timeline, told)?,
+        false => Session::open(at_hand, how, TIME_STEP, (&timeline, &spent), told)?,
     };
     let is_watched = window.is_some() || is_traced;
     let manage = |scene| manage(scene, settings, is_watched.then_some(&timeline));
@@ -102,7 +104,7 @@ fn run_beside<'c>(
             (manager, at_hand.surgery, measure)
         }
         None => {
-            let how = (manager, &manage as Manage<'_>);
+            let how = (manager, Manage { make: &manage, spent: &spent });
             run_unwatched((args, patient, outputs), links, how, begin, count, told)?
         }
     };
@@ -113,7 +115,7 @@ fn run_beside<'c>(
     if let Some(output) = &outputs.save {
         told.attempt(save(patient, &manager, output.path()));
     }
-    let report = Report::of("craniotomy", args.way.simd(), &manager, &measure);
+    let report = Report::of("craniotomy", args.way.simd(), &manager, spent, &measure);
     Ok(Report { operation: Some(surgery.report(&manager)), ..report })
 }
 
@@ -229,7 +231,14 @@ impl<'c> Surgery<'c> {
         };
         recording.run(&mut manager, frames.min(until_look), &mut watch, &mut on_frame)?;
         self.devices = [0, 1].map(|hand| hands.device(hand));
-        let (manager, freed) = self.operation.look(manager, manage)?;
+        let (seconds, is_another) = (manager.stage_seconds(), Cell::new(false));
+        let (manager, freed) = self.operation.look(manager, |scene| {
+            is_another.set(true);
+            (manage.make)(scene)
+        })?;
+        if is_another.get() {
+            manage.spent.add(&seconds);
+        }
         if freed > 0 {
             recording.objects(&manager);
             self.pieces += freed;

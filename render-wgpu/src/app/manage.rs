@@ -1,15 +1,49 @@
 //! Managers that are made anew: of a scene that was taken out of another one.
 
+use std::cell::RefCell;
 use std::sync::Arc;
 
+use dualframe_sim::executor::StageSeconds;
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::scene::Scene;
 use dualframe_sim::timeline::Timeline;
 
 use super::error::RunError;
 
-/// Makes a manager of a scene, each time by the same settings.
-pub(super) type Manage<'a> = &'a dyn Fn(Scene) -> Result<VeManager, RunError>;
+/// How managers are made anew.
+#[derive(Clone, Copy)]
+pub(super) struct Manage<'a> {
+    /// Makes a manager of a scene, each time by the same settings.
+    pub(super) make: &'a dyn Fn(Scene) -> Result<VeManager, RunError>,
+    pub(super) spent: &'a Spent,
+}
+
+/// What workers spent their time on under managers that are gone.
+#[derive(Default)]
+pub(super) struct Spent(RefCell<Vec<StageSeconds>>);
+
+impl Spent {
+    /// Adds the seconds of a manager that is gone.
+    pub(super) fn add(&self, seconds: &[StageSeconds]) {
+        let mut all = self.0.borrow_mut();
+        if all.len() < seconds.len() {
+            all.resize(seconds.len(), StageSeconds::default());
+        }
+        for (sum, worker) in all.iter_mut().zip(seconds) {
+            sum.broad_phase += worker.broad_phase;
+            sum.interaction += worker.interaction;
+            sum.update += worker.update;
+            sum.render += worker.render;
+            sum.idle += worker.idle;
+        }
+    }
+
+    /// All seconds, worker by worker, with those of the last manager.
+    pub(super) fn with(self, last: &VeManager) -> Vec<StageSeconds> {
+        self.add(&last.stage_seconds());
+        self.0.into_inner()
+    }
+}
 
 /// A manager whose workers tell a timeline, if there is one, what they do.
 pub(super) fn manage(

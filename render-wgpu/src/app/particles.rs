@@ -17,6 +17,7 @@ use dualframe_sim::timeline::Timeline;
 use super::AllocationCounter;
 use super::args::Particles;
 use super::error::RunError;
+use super::manage::Spent;
 use super::measure::Measure;
 use super::outputs::{self, Outputs};
 use super::pictures::Pictures;
@@ -59,7 +60,8 @@ pub(super) fn run(
     let how = (&args.way, &args.products);
     let time_step = ParticleScene::TIME_STEP;
     let at_hand = || Ok(ParticlesAtHand::begin(args));
-    let window = Session::open(at_hand, how, time_step, &timeline, told)?;
+    let spent = Spent::default();
+    let window = Session::open(at_hand, how, time_step, (&timeline, &spent), told)?;
     let mut manager = VeManager::new(build(args)?, settings)?;
     if window.is_some() || outputs.trace.is_some() {
         manager.watch(Arc::clone(&timeline));
@@ -72,7 +74,7 @@ pub(super) fn run(
             let picture = outputs.picture.as_deref();
             let on_frame = &mut |record: &FrameRecord| measure.frame(record);
             let (manager, _) = window.run(manager, recording, args.frames, picture, on_frame)?;
-            report(args, &manager, &measure, None)
+            report(args, &manager, spent, &measure, None)
         }
         None => run_unwatched(args, outputs, manager, count, told)?,
     };
@@ -137,7 +139,7 @@ fn run_unwatched(
             serial.map(|seconds| seconds / measure.seconds_of_first(REFERENCE_FRAMES))
         }
     };
-    Ok(report(args, &manager, &measure, speed_up))
+    Ok(report(args, &manager, Spent::default(), &measure, speed_up))
 }
 
 /// Seconds that the serial executor takes for the first frames of the same environment.
@@ -154,9 +156,10 @@ fn serial_seconds(args: &Particles, settings: Settings, frames: u64) -> Result<f
 fn report(
     args: &Particles,
     manager: &VeManager,
+    spent: Spent,
     measure: &Measure<'_>,
     speed_up: Option<f64>,
 ) -> Report {
-    let report = Report::of("particles", args.way.simd(), manager, measure);
+    let report = Report::of("particles", args.way.simd(), manager, spent, measure);
     Report { seed: args.seed, gravity: args.gravity, speed_up, ..report }
 }

@@ -12,6 +12,7 @@ use serde::{Serialize, Serializer};
 
 use super::error::RunError;
 use super::haptics::HapticsReport;
+use super::manage::Spent;
 use super::measure::Measure;
 use super::outputs;
 
@@ -168,11 +169,13 @@ impl From<&(ObjectId, Fault)> for Quarantined {
 }
 
 impl Report {
-    /// Of a run in a scene of this kind that has ended, as far as all scenes have it.
+    /// Of a run in a scene of this kind that has ended, as far as all scenes have it. `spent` is what workers did
+    /// under earlier managers.
     pub(super) fn of(
         scene: &'static str,
         simd: Simd,
         manager: &VeManager,
+        spent: Spent,
         measure: &Measure<'_>,
     ) -> Self {
         let (mut objects, mut nodes, mut springs) = (0, 0, 0);
@@ -210,7 +213,7 @@ impl Report {
             collisions: measure.collisions.clone(),
             state_hash: format!("{:016x}", manager.state_hash()),
             allocations: measure.allocations(),
-            stage_seconds: manager.stage_seconds().iter().map(Into::into).collect(),
+            stage_seconds: spent.with(manager).iter().map(Into::into).collect(),
             quarantined: quarantined.iter().map(Into::into).collect(),
             non_finite,
             operation: None,

@@ -59,6 +59,24 @@ fn simulated_hands_operate() {
     refused(&["--haptic-rate", "100"], "500 to 4000 Hz");
 }
 
+/// The environment goes on in another executor whenever freed bone was looked for.
+#[test]
+fn seconds_of_a_drilled_hole_are_those_of_all_frames() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let json = folder.path().join("report.json");
+    let args = ["craniotomy", "--step", "burr-hole", "--headless", "--threads", "2", "--json"];
+    let output = run(&[&args[..], &[json.to_str().expect("a plain path")]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report = read_json(&json);
+    assert!(report["bone_removed_mm3"].as_f64() > Some(100.0));
+    let seconds = report["seconds"].as_f64().expect("a number");
+    for worker in report["stage_seconds"].as_array().expect("one for each worker") {
+        let stages = worker.as_object().expect("seconds by stage").values();
+        let sum: f64 = stages.filter_map(serde_json::Value::as_f64).sum();
+        assert!(sum > 0.7 * seconds, "{sum} of {seconds} s");
+    }
+}
+
 #[test]
 fn what_is_no_head_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");

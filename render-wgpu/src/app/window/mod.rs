@@ -40,7 +40,7 @@ pub(super) use self::particles::ParticlesAtHand;
 use self::view::{Shown, View};
 use super::args::{Products, Way, entry};
 use super::error::RunError;
-use super::manage::{Manage, manage};
+use super::manage::{Manage, Spent, manage};
 use super::pictures;
 use super::recording::Recording;
 use super::told::Told;
@@ -92,6 +92,7 @@ pub(super) struct Session<'a, S: Scenario> {
     /// What the environment was last told.
     applied: Controls,
     way: &'a Way,
+    spent: &'a Spent,
     told: &'a Told,
 }
 
@@ -105,7 +106,7 @@ impl<'a, S: Scenario> Session<'a, S> {
         make: impl FnOnce() -> Result<(S, S::Hand), RunError>,
         (way, products): (&'a Way, &Products),
         time_step: f32,
-        timeline: &Arc<Timeline>,
+        (timeline, spent): (&Arc<Timeline>, &'a Spent),
         told: &'a Told,
     ) -> Result<Option<Self>, RunError> {
         if !products.prefers_window() {
@@ -121,7 +122,7 @@ impl<'a, S: Scenario> Session<'a, S> {
         };
         let look = |quality| scenario.look(quality);
         match View::open(shown, look, products.adapter.as_deref(), controls) {
-            Ok(view) => Ok(Some(Self { scenario, view, applied: controls, way, told })),
+            Ok(view) => Ok(Some(Self { scenario, view, applied: controls, way, spent, told })),
             Err(error) if products.window => Err(error.into()),
             Err(error) => {
                 told.note(&format!(
@@ -193,8 +194,9 @@ impl<'a, S: Scenario> Session<'a, S> {
             on_frame(record);
         };
         let (settings, timeline) = (self.settings(), Arc::clone(&self.view.timeline));
-        let manage = move |scene| manage(scene, settings, Some(&timeline));
-        let host = (&mut on_frame as &mut dyn FnMut(&FrameRecord), &manage as Manage<'_>);
+        let make = move |scene| manage(scene, settings, Some(&timeline));
+        let manage = Manage { make: &make, spent: self.spent };
+        let host = (&mut on_frame as &mut dyn FnMut(&FrameRecord), manage);
         self.scenario.advance(&mut self.view, manager, recording, frames, host)
     }
 
@@ -225,6 +227,7 @@ impl<'a, S: Scenario> Session<'a, S> {
                 let frame = manager.frame();
                 self.told.note(&format!("the recording ends before frame {frame}: started anew"));
             }
+            self.spent.add(&manager.stage_seconds());
             manager = self.restart()?;
         }
         let is_pipeline = now.executor == ExecutorKind::Pipeline;
@@ -232,6 +235,7 @@ impl<'a, S: Scenario> Session<'a, S> {
             || (is_pipeline && now.frames_in_flight != before.frames_in_flight)
             || (!is_pipeline && now.threads != before.threads);
         if is_rebuilt {
+            self.spent.add(&manager.stage_seconds());
             manager = self.manage(manager.into_scene())?;
         }
         manager.pool().resize(now.threads);
