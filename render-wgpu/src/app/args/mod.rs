@@ -293,12 +293,20 @@ impl Particles {
         self.frames.unwrap_or(USUAL_FRAMES)
     }
 
+    /// The most particles that the broad phase allows.
+    pub(in crate::app) fn most_objects(&self) -> usize {
+        match self.way.grain(Grain::Spatial) {
+            Grain::Spatial => ParticleScene::MAX_OBJECTS,
+            Grain::Pairwise => MAX_PAIRWISE,
+        }
+    }
+
     /// What fits no single argument.
     fn check(self) -> Result<Self, String> {
-        if self.way.grain(Grain::Spatial) == Grain::Pairwise && self.objects > MAX_PAIRWISE {
-            let objects = self.objects;
+        let (objects, most) = (self.objects, self.most_objects());
+        if objects > most {
             return Err(format!(
-                "--objects {objects}: --broad-phase pairwise allows {MAX_PAIRWISE} particles"
+                "--objects {objects}: --broad-phase pairwise allows {most} particles"
             ));
         }
         Ok(self)

@@ -1,6 +1,5 @@
 //! What a person can change of the particles.
 
-use dualframe_sim::scene::ParticleScene;
 use egui::{DragValue, Grid, Slider, Ui};
 
 use crate::app::args::Particles;
@@ -17,13 +16,16 @@ pub(super) struct Physics {
     pub(super) damping: f32,
     /// Particles at the next start.
     pub(super) objects: usize,
+    /// How many they may be.
+    pub(super) most_objects: usize,
 }
 
 impl Physics {
-    /// What a particle environment starts with; see [`ParticleScene`].
+    /// What a particle environment starts with; see [`dualframe_sim::scene::ParticleScene`].
     pub(super) fn new(args: &Particles) -> Self {
         let gravity = if args.gravity { 9.81 } else { 0.0 };
-        Self { gravity, stiffness: 60.0, damping: 0.02, objects: args.objects }
+        let (objects, most_objects) = (args.objects, args.most_objects());
+        Self { gravity, stiffness: 60.0, damping: 0.02, objects, most_objects }
     }
 
     pub(super) fn show(&mut self, ui: &mut Ui, controls: &mut Controls) {
@@ -40,12 +42,37 @@ impl Physics {
             ui.label("particles");
             ui.horizontal(|ui| {
                 let objects = DragValue::new(&mut self.objects);
-                ui.add(objects.range(1..=ParticleScene::MAX_OBJECTS).speed(10.0));
+                ui.add(objects.range(1..=self.most_objects).speed(10.0));
                 if ui.button("Restart").clicked() {
                     controls.restarts += 1;
                 }
             });
             ui.end_row();
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{Args, Command, FromArgMatches};
+    use dualframe_sim::scene::ParticleScene;
+    use egui::{Context, RawInput};
+
+    use super::*;
+
+    #[test]
+    fn no_more_particles_than_the_broad_phase_allows() {
+        for (kind, most) in [("spatial", ParticleScene::MAX_OBJECTS), ("pairwise", 4_090)] {
+            let command = Particles::augment_args(Command::new("dualframe"));
+            let matches = command.get_matches_from(["dualframe", "--broad-phase", kind]);
+            let args = Particles::from_arg_matches(&matches).expect("sound arguments");
+            let (mut physics, mut controls) = (Physics::new(&args), Controls::new(&args.way));
+            physics.objects = usize::MAX;
+            let show = |ui: &mut Ui| physics.show(ui, &mut controls);
+            let mut drawn = Context::default().run_ui(RawInput::default(), show);
+            // What is left of it would be reported as forgotten.
+            drawn.textures_delta.clear();
+            assert_eq!(physics.objects, most, "{kind}");
+        }
     }
 }
