@@ -5,7 +5,6 @@ use std::sync::mpsc::Sender;
 use bytemuck::{Pod, Zeroable};
 use dualframe_sim::object::ObjectId;
 use glam::{Mat4, Vec2, Vec3};
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{
     BindGroup, Buffer, BufferDescriptor, BufferUsages, ColorTargetState, CommandEncoder, Device,
     Extent3d, FragmentState, LoadOp, MultisampleState, Operations, PipelineLayoutDescriptor,
@@ -129,12 +128,15 @@ impl Picker {
         let crop = Mat4::from_scale(scale) * Mat4::from_translation(-point.extend(0.0));
         let view = context.view.seen_by(crop * context.view.view_projection);
         let numbers = view.numbers();
-        // The queue's own writes would all be done before the first of several picks.
-        let sent = context.gpu.device.create_buffer_init(&BufferInitDescriptor {
+        // One for each: the queue's writes are all done before the first of several picks.
+        let sent = context.gpu.device.create_buffer(&BufferDescriptor {
             label: Some("picking"),
-            contents: bytemuck::cast_slice(numbers.as_words()),
-            usage: BufferUsages::COPY_SRC,
+            size: Globals::SIZE,
+            usage: BufferUsages::COPY_SRC | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
         });
+        let bytes = bytemuck::cast_slice(numbers.as_words());
+        context.gpu.queue.write_buffer(&sent, 0, bytes);
         encoder.copy_buffer_to_buffer(&sent, 0, &self.numbers, 0, Globals::SIZE);
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("picking"),
