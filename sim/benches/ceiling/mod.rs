@@ -54,6 +54,11 @@ impl Ceiling {
         }
     }
 
+    /// Where the nodes of the first body are.
+    pub(crate) fn positions(&self) -> impl Iterator<Item = Vec3> {
+        self.positions.iter().map(|Node([x, y, z])| Vec3::new(x[0], y[0], z[0]))
+    }
+
     /// Integrates all substeps, compiled for these instructions.
     pub(crate) fn advance(&mut self, instructions: Instructions) {
         match instructions {

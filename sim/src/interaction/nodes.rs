@@ -48,7 +48,9 @@ impl NodeSpheres {
     }
 }
 
-/// Keeps the rounding of a box from hiding a touch that the distance would show.
+/// Keeps the rounding of a box from hiding a touch that the distance would show, as far as coordinates of about the
+/// size of the bodies are rounded; usually 1.001. Far away, and where boxes are tested alone, a touch may be
+/// missed by as much as a coordinate is rounded.
 const ROUNDING_MARGIN: f32 = 1.001;
 
 /// The search for overlapping spheres of two meshes.

@@ -18,6 +18,19 @@ impl Avx2 {
         // SAFETY: the machine has AVX2, or there were no `self`.
         unsafe { with_avx2(self, kernel) }
     }
+
+    /// The lanes in which a comparison holds.
+    #[inline(always)]
+    fn lanes_where<const HOLDS: i32>(self, a: Pair, b: Pair) -> LaneSet {
+        // SAFETY: as in `run`.
+        let [low, high] = unsafe {
+            [
+                _mm256_movemask_ps(_mm256_cmp_ps::<HOLDS>(a[0], b[0])),
+                _mm256_movemask_ps(_mm256_cmp_ps::<HOLDS>(a[1], b[1])),
+            ]
+        };
+        (low | high << HALF) as LaneSet
+    }
 }
 
 #[target_feature(enable = "avx2")]
@@ -272,20 +285,12 @@ impl Isa for Avx2 {
 
     #[inline(always)]
     fn less(self, a: Pair, b: Pair) -> LaneSet {
-        // SAFETY: the machine has AVX2, or there were no `self`.
-        let set = |half: usize| unsafe {
-            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a[half], b[half]))
-        };
-        (set(0) | set(1) << HALF) as LaneSet
+        self.lanes_where::<_CMP_LT_OQ>(a, b)
     }
 
     #[inline(always)]
     fn at_most(self, a: Pair, b: Pair) -> LaneSet {
-        // SAFETY: the machine has AVX2, or there were no `self`.
-        let set = |half: usize| unsafe {
-            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a[half], b[half]))
-        };
-        (set(0) | set(1) << HALF) as LaneSet
+        self.lanes_where::<_CMP_LE_OQ>(a, b)
     }
 
     #[inline(always)]
