@@ -6,7 +6,7 @@ use std::any::Any;
 use std::cmp::Reverse;
 use std::sync::Arc;
 
-use super::abreast::{self, AdvanceAbreast, MOST, seat};
+use super::abreast::{AdvanceAbreast, WIDEST, seat};
 use super::spring_kernel::{self, Advance, Springs};
 use super::workspace::SpringWork;
 use super::{Input, MassSpring};
@@ -19,8 +19,11 @@ use crate::simd::{HALF, Simd};
 const WORTH: u64 = 4;
 
 /// The most nodes of a body that is advanced together with others; usually 1,024, with which sixteen
-/// bodies fit a second-level cache of 1 MB.
+/// bodies fit a second-level cache of 1 MB, or half as many in twice as many lanes.
 const MOST_NODES: usize = 1_024;
+
+/// What a step in all lanes costs, if a register holds them, over one in half of them, as a fraction; usually 5/4.
+const WIDE_STEP: [u64; 2] = [5, 4];
 
 /// Whether a body of so many nodes may be advanced together with others.
 pub(super) fn may_be_abreast(nodes: usize) -> bool {
@@ -63,10 +66,13 @@ pub(crate) fn advance(objects: &mut [Object], work: &mut SpringWork, simd: Simd)
     waiting.sort_unstable_by_key(|body| (body.kind(), Reverse(body.springs.substeps), body.place));
     for mut alike in waiting.chunk_by(|a, b| a.kind() == b.kind()) {
         while let [first, ..] = alike {
-            let (now, later) = alike.split_at(together(alike));
+            let Some(mesh) = objects[first.place].geometry.as_mesh_mut() else { break };
+            let is_small = mesh.topology().nodes() <= MOST_NODES / 2;
+            let (count, lanes) = together(alike, if is_small { simd.width() } else { HALF });
+            let (now, later) = alike.split_at(count);
             if now.len() > 1 {
-                advance_together(now, objects, &mut work.abreast, simd);
-            } else if let Some(mesh) = objects[first.place].geometry.as_mesh_mut() {
+                advance_together(now, lanes, objects, work, simd);
+            } else {
                 advance_alone(mesh, first.springs, &mut work.alone, simd);
             }
             alike = later;
@@ -75,30 +81,61 @@ pub(crate) fn advance(objects: &mut [Object], work: &mut SpringWork, simd: Simd)
     work.waiting = waiting;
 }
 
-/// How many of the first bodies are best advanced together.
-fn together(bodies: &[Waiting]) -> usize {
-    let most = &bodies[..bodies.len().min(MOST)];
-    let mut lanes = [0; HALF];
-    for (place, body) in most.iter().enumerate() {
-        let (_, lane) = seat(place);
-        lanes[lane] += u64::from(body.springs.substeps);
+/// How many of the first bodies are best advanced together, and in how many lanes, of which there are at most
+/// `width`.
+fn together(bodies: &[Waiting], width: usize) -> (usize, usize) {
+    let half = Filling::of(bodies, HALF);
+    let [cost, cost_of_half] = WIDE_STEP;
+    if width > HALF {
+        let all = Filling::of(bodies, width);
+        if all.substeps * half.steps * cost_of_half > half.substeps * all.steps * cost {
+            return (all.bodies, width);
+        }
     }
-    let (all, longest) = (lanes.iter().sum::<u64>(), lanes.into_iter().max());
-    if all >= WORTH * longest.unwrap_or(0) { most.len() } else { 1 }
+    if half.substeps >= WORTH * half.steps { (half.bodies, HALF) } else { (1, HALF) }
+}
+
+/// What is done if as many bodies as there is room for are advanced together.
+struct Filling {
+    bodies: usize,
+    /// Of all of them.
+    substeps: u64,
+    /// As many as the longest lane has substeps.
+    steps: u64,
+}
+
+impl Filling {
+    fn of(bodies: &[Waiting], lanes: usize) -> Self {
+        let bodies = &bodies[..bodies.len().min(2 * lanes)];
+        let mut substeps = [0; WIDEST];
+        for (index, body) in bodies.iter().enumerate() {
+            let (_, lane) = seat(index, lanes);
+            substeps[lane] += u64::from(body.springs.substeps);
+        }
+        let steps = substeps.into_iter().max().unwrap_or(0);
+        Self { bodies: bodies.len(), substeps: substeps.into_iter().sum(), steps }
+    }
 }
 
 fn advance_together(
     bodies: &[Waiting],
+    lanes: usize,
     objects: &mut [Object],
-    nodes: &mut abreast::Nodes,
+    work: &mut SpringWork,
     simd: Simd,
 ) {
-    let mut seated = [const { [const { None }; HALF] }; 2];
-    for (place, object) in objects.iter_mut().enumerate() {
-        if let Some(index) = bodies.iter().position(|body| body.place == place)
+    let SpringWork { abreast: nodes, indices, .. } = work;
+    indices.clear();
+    indices.resize(objects.len(), None);
+    for (index, body) in bodies.iter().enumerate() {
+        indices[body.place] = Some(index as u8);
+    }
+    let mut seated = [const { [const { None }; WIDEST] }; 2];
+    for (object, &mut index) in objects.iter_mut().zip(indices) {
+        if let Some(index) = index.map(usize::from)
             && let Some(mesh) = object.geometry.as_mesh_mut()
         {
-            let (turn, lane) = seat(index);
+            let (turn, lane) = seat(index, lanes);
             seated[turn][lane] = Some((mesh.kernel_parts(), bodies[index].springs));
         }
     }

@@ -163,6 +163,12 @@ impl Arithmetic for Avx2Half {
         // SAFETY: as in `splat`.
         unsafe { _mm256_sqrt_ps(a) }
     }
+
+    #[inline(always)]
+    fn choose(self, chooser: __m256, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm256_or_ps(_mm256_and_ps(chooser, a), _mm256_andnot_ps(chooser, b)) }
+    }
 }
 
 impl HalfIsa for Avx2Half {
@@ -183,12 +189,6 @@ impl HalfIsa for Avx2Half {
                 _mm256_permute2f128_ps::<0x31>(low_d, high_d),
             ]
         }
-    }
-
-    #[inline(always)]
-    fn choose(self, chooser: __m256, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: as in `splat`.
-        unsafe { _mm256_or_ps(_mm256_and_ps(chooser, a), _mm256_andnot_ps(chooser, b)) }
     }
 }
 
@@ -254,6 +254,11 @@ impl Arithmetic for Avx2 {
     #[inline(always)]
     fn sqrt(self, a: Pair) -> Pair {
         [self.0.sqrt(a[0]), self.0.sqrt(a[1])]
+    }
+
+    #[inline(always)]
+    fn choose(self, chooser: Pair, a: Pair, b: Pair) -> Pair {
+        [self.0.choose(chooser[0], a[0], b[0]), self.0.choose(chooser[1], a[1], b[1])]
     }
 }
 

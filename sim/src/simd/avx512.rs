@@ -87,6 +87,18 @@ impl Arithmetic for Avx512 {
         // SAFETY: as in `splat`.
         unsafe { _mm512_sqrt_ps(a) }
     }
+
+    #[inline(always)]
+    fn choose(self, chooser: __m512, a: __m512, b: __m512) -> __m512 {
+        /// For each bit that of the second operand where the first's is set, of the third elsewhere.
+        const CHOICE: i32 = 0b1100_1010;
+        // SAFETY: as in `splat`.
+        unsafe {
+            let (a, b) = (_mm512_castps_si512(a), _mm512_castps_si512(b));
+            let chooser = _mm512_castps_si512(chooser);
+            _mm512_castsi512_ps(_mm512_ternarylogic_epi32::<CHOICE>(chooser, a, b))
+        }
+    }
 }
 
 impl Isa for Avx512 {

@@ -119,6 +119,15 @@ impl Simd {
         }
     }
 
+    /// How many numbers one register holds, [`HALF`] at least: lanes beyond that cost as much as doing them later.
+    pub(crate) fn width(self) -> usize {
+        match self.0 {
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512(_) => LANES,
+            _ => HALF,
+        }
+    }
+
     /// Those to use for a kernel that looks up among so many chunks of nodes.
     pub(crate) fn for_look_up(self, chunks: usize) -> Self {
         match self.0 {
@@ -166,15 +175,15 @@ pub(crate) trait Arithmetic: Copy {
     fn mul(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
     fn div(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
     fn sqrt(self, a: Self::Vector) -> Self::Vector;
+
+    /// The bits of `a` where those of `chooser` are set, of `b` elsewhere.
+    fn choose(self, chooser: Self::Vector, a: Self::Vector, b: Self::Vector) -> Self::Vector;
 }
 
 /// The operations on half of [`LANES`] numbers at once.
 pub(crate) trait HalfIsa: Arithmetic<Lanes = HalfLanes> {
     /// Rows become columns.
     fn transpose(self, rows: [Self::Vector; HALF]) -> [Self::Vector; HALF];
-
-    /// The bits of `a` where those of `chooser` are set, of `b` elsewhere.
-    fn choose(self, chooser: Self::Vector, a: Self::Vector, b: Self::Vector) -> Self::Vector;
 }
 
 /// The operations on [`LANES`] numbers at once.

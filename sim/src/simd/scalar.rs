@@ -71,6 +71,16 @@ impl<const N: usize> Arithmetic for Plain<N> {
     fn sqrt(self, a: [f32; N]) -> [f32; N] {
         a.map(f32::sqrt)
     }
+
+    #[inline(always)]
+    fn choose(self, chooser: [f32; N], a: [f32; N], b: [f32; N]) -> [f32; N] {
+        let mut chosen = b;
+        for lane in 0..N {
+            let set = chooser[lane].to_bits();
+            chosen[lane] = f32::from_bits(set & a[lane].to_bits() | !set & b[lane].to_bits());
+        }
+        chosen
+    }
 }
 
 impl HalfIsa for Plain<HALF> {
@@ -83,16 +93,6 @@ impl HalfIsa for Plain<HALF> {
             }
         }
         columns
-    }
-
-    #[inline(always)]
-    fn choose(self, chooser: HalfLanes, a: HalfLanes, b: HalfLanes) -> HalfLanes {
-        let mut chosen = b;
-        for lane in 0..HALF {
-            let set = chooser[lane].to_bits();
-            chosen[lane] = f32::from_bits(set & a[lane].to_bits() | !set & b[lane].to_bits());
-        }
-        chosen
     }
 }
 

@@ -43,7 +43,8 @@ struct Outcome {
     at_most: LaneSet,
     min: [u32; LANES],
     max: [u32; LANES],
-    chosen: [u32; HALF],
+    chosen: [u32; LANES],
+    chosen_half: [u32; HALF],
     columns: [[u32; HALF]; HALF],
     nodes: Vec<u32>,
     kept: Vec<[u32; 3]>,
@@ -59,6 +60,10 @@ fn bits<const N: usize>(lanes: [f32; N]) -> [u32; N] {
 
 fn halves(lanes: Lanes) -> [HalfLanes; 2] {
     [0, 1].map(|half| std::array::from_fn(|lane| lanes[half * HALF + lane]))
+}
+
+fn choose(chooser: f32, a: f32, b: f32) -> u32 {
+    chooser.to_bits() & a.to_bits() | !chooser.to_bits() & b.to_bits()
 }
 
 impl Outcome {
@@ -78,10 +83,8 @@ impl Outcome {
             at_most: set(|a, b| a <= b),
             min: pick(|a, b| a < b),
             max: pick(|a, b| a > b),
-            chosen: std::array::from_fn(|lane| {
-                let chooser = of_b[lane].to_bits();
-                chooser & low[lane].to_bits() | !chooser & high[lane].to_bits()
-            }),
+            chosen: std::array::from_fn(|lane| choose(b[lane], a[lane], a[LANES - 1 - lane])),
+            chosen_half: std::array::from_fn(|lane| choose(of_b[lane], low[lane], high[lane])),
             columns: std::array::from_fn(|column| bits(std::array::from_fn(|at| row(at)[column]))),
             nodes: lanes(KEPT).map(|lane| FIRST + lane as u32).collect(),
             kept: lanes(KEPT).map(|lane| bits([a[lane], b[lane], a[lane]])).collect(),
@@ -112,6 +115,8 @@ impl Kernel for Try {
         let ([low, high], [of_b, _]) = (halves(a), halves(b));
         let rows =
             std::array::from_fn(|row| half.load(if row.is_multiple_of(2) { &low } else { &high }));
+        let mut reversed = a;
+        reversed.reverse();
         let (mut nodes, [mut p, mut q, mut r]) = ([0; LANES], [[0.0; LANES]; 3]);
         isa.compress(KEPT, FIRST, [x, y, x], &mut nodes, [&mut p, &mut q, &mut r]);
         let count = KEPT.count_ones() as usize;
@@ -120,7 +125,12 @@ impl Kernel for Try {
             at_most: isa.at_most(x, y),
             min: stored(isa.min(x, y)),
             max: stored(isa.max(x, y)),
-            chosen: half_stored(half.choose(half.load(&of_b), half.load(&low), half.load(&high))),
+            chosen: stored(isa.choose(y, x, isa.load(&reversed))),
+            chosen_half: half_stored(half.choose(
+                half.load(&of_b),
+                half.load(&low),
+                half.load(&high),
+            )),
             columns: half.transpose(rows).map(half_stored),
             nodes: nodes[..count].to_vec(),
             kept: (0..count).map(|place| bits([p[place], q[place], r[place]])).collect(),

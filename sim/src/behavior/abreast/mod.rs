@@ -10,28 +10,42 @@ mod nodes;
 
 use std::hint::black_box;
 
-use self::nodes::{Body, Force, Node, exchange, gather, scatter};
+use self::nodes::{Body, Columns, Force, Motion, Node, Set, exchange, gather, scatter};
 use super::spring_kernel::Springs;
 use super::spring_law::{Dashpot, Elastic, Law, load, minus, plus, store, times};
-use crate::geometry::{KernelParts, LANES, Spring, Topology};
-use crate::simd::{HALF, HalfIsa, HalfLanes, Isa, Kernel};
+use crate::geometry::{KernelParts, LANES, Lanes, Spring, Topology};
+use crate::simd::{Arithmetic, HALF, HalfIsa, HalfLanes, Isa, Kernel};
 
-pub(super) use self::nodes::Nodes;
-
-/// The most bodies that share the lanes.
-pub(super) const MOST: usize = 2 * HALF;
+/// The most lanes.
+pub(super) const WIDEST: usize = LANES;
 
 /// The lane of a body by its place in descending order of substeps, and whether it comes second there:
 /// the longest shares with the shortest.
-pub(super) fn seat(place: usize) -> (usize, usize) {
-    if place < HALF { (0, place) } else { (1, MOST - 1 - place) }
+pub(super) fn seat(place: usize, lanes: usize) -> (usize, usize) {
+    if place < lanes { (0, place) } else { (1, 2 * lanes - 1 - place) }
+}
+
+/// Memory for the bodies' nodes.
+#[derive(Debug, Default)]
+pub(super) struct Nodes {
+    half: Set<HalfLanes>,
+    all: Set<Lanes>,
+}
+
+impl Nodes {
+    /// Makes room for bodies of so many nodes.
+    pub(super) fn reserve(&mut self, nodes: usize) {
+        self.half.reserve(nodes);
+        self.all.reserve(nodes);
+    }
 }
 
 /// One frame of some bodies: those first in the lanes and those second. The first lane has a body, and
 /// no lane has a second one without a first. All share their topology, whose number of nodes all their
 /// lists have, and are damped or all not.
 pub(super) struct AdvanceAbreast<'a> {
-    pub(super) bodies: [[Option<Body<'a>>; HALF]; 2],
+    /// Beyond [`HALF`] only if the instructions have registers for that.
+    pub(super) bodies: [[Option<Body<'a>>; WIDEST]; 2],
     pub(super) nodes: &'a mut Nodes,
 }
 
@@ -40,41 +54,56 @@ impl Kernel for AdvanceAbreast<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        let (Self { bodies: [mut first, mut second], nodes }, isa) = (self, isa.half());
-        let Some((KernelParts { topology, .. }, springs)) = &first[0] else { return };
-        let (topology, idle) = (*topology, Seat { springs: *springs, left: 0 });
-        nodes.reserve(topology.nodes());
-        let len = topology.present().len() * LANES;
-        let ([now, next], forces) = (nodes.sets.each_mut(), &mut nodes.forces);
-        let (now, next) = (&mut now[..len], &mut next[..len]);
-        let forces = &mut forces[..topology.nodes()];
-        let mut moving = begin(isa, topology, &first, idle, (&mut *now, &mut *forces));
-        let mut later = begin(isa, topology, &second, idle, (&mut *next, &mut *forces));
-        loop {
-            let takes: [bool; HALF] =
-                std::array::from_fn(|lane| moving[lane].left == 0 && later[lane].left > 0);
-            if takes.contains(&true) {
-                exchange(isa, now, next, mask(isa, takes));
-                for lane in (0..HALF).filter(|&lane| takes[lane]) {
-                    moving[lane] = std::mem::replace(&mut later[lane], idle);
-                }
-            }
-            let left = moving.iter().map(|seat| seat.left).filter(|&left| left > 0);
-            let Some(substeps) = left.min() else { break };
-            advance(isa, topology, &moving, substeps, (&mut *now, &mut *forces));
-            for seat in &mut moving {
-                seat.left = seat.left.saturating_sub(substeps);
-            }
+        let Self { mut bodies, nodes } = self;
+        if bodies[0][HALF].is_some() {
+            advance_all(isa, isa.half(), &mut bodies, &mut nodes.all);
+        } else {
+            advance_all(isa.half(), isa.half(), &mut bodies, &mut nodes.half);
         }
-        // In lanes with two bodies the first one's place is where the second one began.
-        for (first, second) in first.iter_mut().zip(&mut second) {
-            if second.is_some() {
-                std::mem::swap(first, second);
-            }
-        }
-        scatter(isa, now, &mut first);
-        scatter(isa, next, &mut second);
     }
+}
+
+/// One frame of bodies in as many lanes as `isa` has; `half` brings them there.
+#[inline(always)]
+fn advance_all<A: Arithmetic<Lanes: Columns>, H: HalfIsa>(
+    isa: A,
+    half: H,
+    [first, second]: &mut [[Option<Body<'_>>; WIDEST]; 2],
+    set: &mut Set<A::Lanes>,
+) {
+    let Some((KernelParts { topology, .. }, springs)) = &first[0] else { return };
+    let (topology, idle) = (*topology, Seat { springs: *springs, left: 0 });
+    set.reserve(topology.nodes());
+    let len = topology.present().len() * LANES;
+    let ([now, next], forces) = (&mut set.nodes, &mut set.forces);
+    let (now, next) = (&mut now[..len], &mut next[..len]);
+    let forces = &mut forces[..topology.nodes()];
+    let mut moving = begin(isa, half, topology, first, idle, (&mut *now, &mut *forces));
+    let mut later = begin(isa, half, topology, second, idle, (&mut *next, &mut *forces));
+    loop {
+        let takes = |lane: usize| moving[lane].left == 0 && later[lane].left > 0;
+        let takes: [bool; WIDEST] = std::array::from_fn(takes);
+        if takes.contains(&true) {
+            exchange(isa, now, next, mask(isa, takes));
+            for lane in (0..WIDEST).filter(|&lane| takes[lane]) {
+                moving[lane] = std::mem::replace(&mut later[lane], idle);
+            }
+        }
+        let left = moving.iter().map(|seat| seat.left).filter(|&left| left > 0);
+        let Some(substeps) = left.min() else { break };
+        advance(isa, topology, &moving, substeps, (&mut *now, &mut *forces));
+        for seat in &mut moving {
+            seat.left = seat.left.saturating_sub(substeps);
+        }
+    }
+    // In lanes with two bodies the first one's place is where the second one began.
+    for (first, second) in first.iter_mut().zip(&mut *second) {
+        if second.is_some() {
+            std::mem::swap(first, second);
+        }
+    }
+    scatter(half, now, first);
+    scatter(half, next, second);
 }
 
 /// What a lane computes with.
@@ -87,33 +116,40 @@ struct Seat {
 
 /// One number of each lane.
 #[inline(always)]
-fn numbers<H: HalfIsa>(isa: H, seats: &[Seat; HALF], number: fn(&Springs) -> f32) -> H::Vector {
-    isa.load(&seats.each_ref().map(|seat| number(&seat.springs)))
+fn numbers<A: Arithmetic<Lanes: Columns>>(
+    isa: A,
+    seats: &[Seat; WIDEST],
+    number: fn(&Springs) -> f32,
+) -> A::Vector {
+    isa.load(&A::Lanes::each(|lane| number(&seats[lane].springs)))
 }
 
 /// All bits of the lanes in the set.
 #[inline(always)]
-fn mask<H: HalfIsa>(isa: H, set: [bool; HALF]) -> H::Vector {
-    let bits = set.map(|set| f32::from_bits(if set { u32::MAX } else { 0 }));
+fn mask<A: Arithmetic<Lanes: Columns>>(isa: A, set: [bool; WIDEST]) -> A::Vector {
+    let bits = A::Lanes::each(|lane| f32::from_bits(if set[lane] { u32::MAX } else { 0 }));
     // A compiler that sees through it makes masked stores of choices, which are slow on some machines.
     isa.load(black_box(&bits))
 }
 
 /// Brings bodies side by side and lets the dashpots act. A lane without a body is `idle`.
 #[inline(always)]
-fn begin<H: HalfIsa>(
-    isa: H,
+fn begin<A: Arithmetic<Lanes: Columns>, H: HalfIsa>(
+    isa: A,
+    half: H,
     topology: &Topology,
-    bodies: &[Option<Body<'_>>; HALF],
+    bodies: &[Option<Body<'_>>; WIDEST],
     idle: Seat,
-    (nodes, forces): (&mut [Node], &mut [Force]),
-) -> [Seat; HALF] {
-    let seats = bodies.each_ref().map(|body| match body {
-        Some((_, springs)) => Seat { springs: *springs, left: springs.substeps },
-        None => idle,
-    });
+    (nodes, forces): Motion<'_, A::Lanes>,
+) -> [Seat; WIDEST] {
+    let mut seats = [idle; WIDEST];
+    for (seat, body) in seats.iter_mut().zip(bodies) {
+        if let Some((_, springs)) = body {
+            *seat = Seat { springs: *springs, left: springs.substeps };
+        }
+    }
     if bodies.iter().any(Option::is_some) {
-        gather(isa, bodies, nodes);
+        gather(half, bodies, nodes);
         if idle.springs.damping > 0.0 {
             let law = Dashpot { damping: numbers(isa, &seats, |springs| springs.damping) };
             let time = numbers(isa, &seats, |springs| springs.time);
@@ -126,12 +162,12 @@ fn begin<H: HalfIsa>(
 
 /// Makes some substeps in the lanes where some are left.
 #[inline(always)]
-fn advance<H: HalfIsa>(
-    isa: H,
+fn advance<A: Arithmetic<Lanes: Columns>>(
+    isa: A,
     topology: &Topology,
-    seats: &[Seat; HALF],
+    seats: &[Seat; WIDEST],
     substeps: u32,
-    (nodes, forces): (&mut [Node], &mut [Force]),
+    (nodes, forces): Motion<'_, A::Lanes>,
 ) {
     let stiffness = numbers(isa, seats, |springs| springs.stiffness);
     let edges = Elastic { stiffness, one: isa.splat(1.0) };
@@ -143,13 +179,13 @@ fn advance<H: HalfIsa>(
         numbers(isa, seats, |springs| springs.gravity[2]),
     ];
     let step = Step { gravity, time: numbers(isa, seats, Springs::step_time), drifts: true };
-    let moving = seats.each_ref().map(|seat| seat.left > 0);
-    if moving == [true; HALF] {
+    let rests: [bool; WIDEST] = std::array::from_fn(|lane| seats[lane].left == 0);
+    if !rests[..A::Lanes::COUNT].contains(&true) {
         for _ in 0..substeps {
             step.advance(isa, topology, nodes, forces, laws, None);
         }
     } else {
-        let moving = mask(isa, moving);
+        let moving = mask(isa, rests.map(|rests| !rests));
         for _ in 0..substeps {
             step.advance(isa, topology, nodes, forces, laws, Some(moving));
         }
@@ -171,18 +207,18 @@ impl<V: Copy> Step<V> {
     /// Makes the step, with one law for the springs between nodes and another for those to the centre,
     /// in all lanes or those where the bits of `moving` are set.
     #[inline(always)]
-    fn advance<H: HalfIsa<Vector = V>, L: Law<H>>(
+    fn advance<A: Arithmetic<Lanes: Columns, Vector = V>, L: Law<A>>(
         self,
-        isa: H,
+        isa: A,
         topology: &Topology,
-        nodes: &mut [Node],
-        forces: &mut [Force],
+        nodes: &mut [Node<A::Lanes>],
+        forces: &mut [Force<A::Lanes>],
         [edges, to_center]: [L; 2],
         moving: Option<V>,
     ) {
         let shared = pull_to_center(isa, topology, nodes, forces, to_center);
         edge_forces(isa, topology, nodes, forces, edges);
-        for (node, Force(force)) in nodes.iter_mut().zip(forces) {
+        for (node, Force(force, _)) in nodes.iter_mut().zip(forces) {
             let force = plus(isa, load(isa, force), shared);
             let weight = times(isa, self.gravity, isa.load(&node.mass));
             let factor = isa.mul(isa.load(&node.inverse_mass), self.time);
@@ -199,12 +235,12 @@ impl<V: Copy> Step<V> {
 }
 
 #[inline(always)]
-fn choose<H: HalfIsa>(
-    isa: H,
-    chooser: Option<H::Vector>,
-    a: [H::Vector; 3],
-    b: [H::Vector; 3],
-) -> [H::Vector; 3] {
+fn choose<A: Arithmetic>(
+    isa: A,
+    chooser: Option<A::Vector>,
+    a: [A::Vector; 3],
+    b: [A::Vector; 3],
+) -> [A::Vector; 3] {
     let Some(chooser) = chooser else { return a };
     [
         isa.choose(chooser, a[0], b[0]),
@@ -215,16 +251,16 @@ fn choose<H: HalfIsa>(
 
 /// Adds the forces of the springs between nodes.
 #[inline(always)]
-fn edge_forces<H: HalfIsa, L: Law<H>>(
-    isa: H,
+fn edge_forces<A: Arithmetic<Lanes: Columns>, L: Law<A>>(
+    isa: A,
     topology: &Topology,
-    nodes: &[Node],
-    forces: &mut [Force],
+    nodes: &[Node<A::Lanes>],
+    forces: &mut [Force<A::Lanes>],
     law: L,
 ) {
     // Springs mostly follow others from the same node: its numbers stay at hand.
     let mut from = 0;
-    let Some(Force(force)) = forces.first() else { return };
+    let Some(Force(force, _)) = forces.first() else { return };
     let mut force = load(isa, force);
     let mut own = [load(isa, &nodes[from].position), load(isa, &nodes[from].velocity)];
     for Spring { nodes: [a, b], rest } in topology.springs() {
@@ -243,7 +279,7 @@ fn edge_forces<H: HalfIsa, L: Law<H>>(
             if L::NEEDS_VELOCITY { minus(isa, own[1], load(isa, &other.velocity)) } else { way };
         let pulled = times(isa, way, law.pull(isa, way, relative, isa.splat(*rest)));
         force = minus(isa, force, pulled);
-        let Force(other) = &mut forces[b];
+        let Force(other, _) = &mut forces[b];
         store(isa, plus(isa, load(isa, other), pulled), other);
     }
     store(isa, force, &mut forces[from].0);
@@ -252,13 +288,13 @@ fn edge_forces<H: HalfIsa, L: Law<H>>(
 /// Sets the forces to those of the springs to the centre, and returns the force on all nodes of a body
 /// alike: their share of what is pulled at its centre. All in newtons.
 #[inline(always)]
-fn pull_to_center<H: HalfIsa, L: Law<H>>(
-    isa: H,
+fn pull_to_center<A: Arithmetic<Lanes: Columns>, L: Law<A>>(
+    isa: A,
     topology: &Topology,
-    nodes: &[Node],
-    forces: &mut [Force],
+    nodes: &[Node<A::Lanes>],
+    forces: &mut [Force<A::Lanes>],
     law: L,
-) -> [H::Vector; 3] {
+) -> [A::Vector; 3] {
     let zero = [isa.splat(0.0); 3];
     let Some(rests) = topology.center_rest() else {
         forces.fill(Force::default());
@@ -270,7 +306,7 @@ fn pull_to_center<H: HalfIsa, L: Law<H>>(
     let center = times(isa, center, isa.splat(share));
     let velocity = if L::NEEDS_VELOCITY { sum(isa, nodes, |node| &node.velocity) } else { zero };
     let velocity = times(isa, velocity, isa.splat(share));
-    for ((node, Force(force)), rest) in nodes.iter().zip(&mut *forces).zip(rests) {
+    for ((node, Force(force, _)), rest) in nodes.iter().zip(&mut *forces).zip(rests) {
         let way = minus(isa, center, load(isa, &node.position));
         let relative =
             if L::NEEDS_VELOCITY { minus(isa, velocity, load(isa, &node.velocity)) } else { way };
@@ -286,7 +322,7 @@ fn pull_to_center<H: HalfIsa, L: Law<H>>(
 ///
 /// [`fold`]: crate::simd::fold
 #[inline(always)]
-fn sum<H: HalfIsa, T>(isa: H, nodes: &[T], of: fn(&T) -> &[HalfLanes; 3]) -> [H::Vector; 3] {
+fn sum<A: Arithmetic, T>(isa: A, nodes: &[T], of: fn(&T) -> &[A::Lanes; 3]) -> [A::Vector; 3] {
     let zero = [isa.splat(0.0); 3];
     let mut sums = [zero; HALF];
     for (lane, sum) in sums.iter_mut().enumerate() {
@@ -306,12 +342,12 @@ fn sum<H: HalfIsa, T>(isa: H, nodes: &[T], of: fn(&T) -> &[HalfLanes; 3]) -> [H:
 
 /// The sum over every [`LANES`]th node from the first given on.
 #[inline(always)]
-fn every<H: HalfIsa, T>(
-    isa: H,
+fn every<A: Arithmetic, T>(
+    isa: A,
     nodes: &[T],
     first: usize,
-    of: fn(&T) -> &[HalfLanes; 3],
-) -> [H::Vector; 3] {
+    of: fn(&T) -> &[A::Lanes; 3],
+) -> [A::Vector; 3] {
     let mut rest = nodes.iter().skip(first).step_by(LANES);
     let Some(node) = rest.next() else { return [isa.splat(0.0); 3] };
     let mut sum = load(isa, of(node));

@@ -1,26 +1,98 @@
 //! The nodes of bodies side by side: each body's numbers a column.
 
+use std::fmt::Debug;
+use std::slice;
+
 use super::super::spring_kernel::Springs;
-use crate::geometry::{KernelParts, LANES};
-use crate::simd::{HALF, HalfIsa, HalfLanes};
+use crate::geometry::{KernelParts, LANES, Lanes};
+use crate::simd::{Arithmetic, HALF, HalfIsa, HalfLanes};
+
+/// One number of each body.
+pub(in super::super) trait Columns: Copy + Debug + Default {
+    /// How many bodies there can be.
+    const COUNT: usize;
+    /// Where forces are loaded and stored fastest.
+    type Alignment: Copy + Debug + Default;
+
+    /// `number` of each lane.
+    fn each(number: impl Fn(usize) -> f32) -> Self;
+    fn halves(&self) -> &[HalfLanes];
+    fn halves_mut(&mut self) -> &mut [HalfLanes];
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(32))]
+pub(in super::super) struct OfHalf;
+
+impl Columns for HalfLanes {
+    const COUNT: usize = HALF;
+    type Alignment = OfHalf;
+
+    #[inline(always)]
+    fn each(number: impl Fn(usize) -> f32) -> Self {
+        let mut lanes = [0.0; HALF];
+        for (lane, own) in lanes.iter_mut().enumerate() {
+            *own = number(lane);
+        }
+        lanes
+    }
+
+    #[inline(always)]
+    fn halves(&self) -> &[HalfLanes] {
+        slice::from_ref(self)
+    }
+
+    #[inline(always)]
+    fn halves_mut(&mut self) -> &mut [HalfLanes] {
+        slice::from_mut(self)
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+pub(in super::super) struct OfAll;
+
+impl Columns for Lanes {
+    const COUNT: usize = LANES;
+    type Alignment = OfAll;
+
+    #[inline(always)]
+    fn each(number: impl Fn(usize) -> f32) -> Self {
+        let mut lanes = [0.0; LANES];
+        for (lane, own) in lanes.iter_mut().enumerate() {
+            *own = number(lane);
+        }
+        lanes
+    }
+
+    #[inline(always)]
+    fn halves(&self) -> &[HalfLanes] {
+        self.as_chunks().0
+    }
+
+    #[inline(always)]
+    fn halves_mut(&mut self) -> &mut [HalfLanes] {
+        self.as_chunks_mut().0
+    }
+}
 
 /// One node of each body, where loads and stores are fastest.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
-pub(super) struct Node {
+pub(in super::super) struct Node<C> {
     /// In metres.
-    pub(super) position: [HalfLanes; 3],
+    pub(super) position: [C; 3],
     /// In metres per second.
-    pub(super) velocity: [HalfLanes; 3],
+    pub(super) velocity: [C; 3],
     /// In kilograms.
-    pub(super) mass: HalfLanes,
+    pub(super) mass: C,
     /// In 1/kg.
-    pub(super) inverse_mass: HalfLanes,
+    pub(super) inverse_mass: C,
 }
 
-impl Node {
+impl<C> Node<C> {
     #[inline(always)]
-    fn rows(&mut self) -> [&mut HalfLanes; ROWS] {
+    fn rows(&mut self) -> [&mut C; ROWS] {
         let ([x, y, z], [vx, vy, vz]) = (&mut self.position, &mut self.velocity);
         [x, y, z, vx, vy, vz, &mut self.mass, &mut self.inverse_mass]
     }
@@ -31,34 +103,41 @@ const ROWS: usize = 8;
 
 /// The force on one node of each body, in newtons.
 #[derive(Clone, Copy, Debug, Default)]
-#[repr(align(32))]
-pub(super) struct Force(pub(super) [HalfLanes; 3]);
+pub(in super::super) struct Force<C: Columns>(pub(super) [C; 3], pub(super) C::Alignment);
 
-/// Memory for the bodies' nodes.
+/// Memory for the nodes of bodies side by side.
 #[derive(Debug, Default)]
-pub(in super::super) struct Nodes {
+pub(in super::super) struct Set<C: Columns> {
     /// The bodies under way, and those which wait for a lane or are done; in whole [`LANES`] of nodes.
-    pub(super) sets: [Vec<Node>; 2],
-    pub(super) forces: Vec<Force>,
+    pub(super) nodes: [Vec<Node<C>>; 2],
+    pub(super) forces: Vec<Force<C>>,
 }
 
-impl Nodes {
+impl<C: Columns> Set<C> {
     /// Makes room for bodies of so many nodes.
-    pub(in crate::behavior) fn reserve(&mut self, nodes: usize) {
+    pub(super) fn reserve(&mut self, nodes: usize) {
         let room = nodes.next_multiple_of(LANES);
-        for set in &mut self.sets {
+        for set in &mut self.nodes {
             set.resize(set.len().max(room), Node::default());
         }
         self.forces.resize(self.forces.len().max(room), Force::default());
     }
 }
 
+/// The nodes of all bodies and the forces on them.
+pub(super) type Motion<'n, C> = (&'n mut [Node<C>], &'n mut [Force<C>]);
+
 /// A body with its numbers.
 pub(in super::super) type Body<'a> = (KernelParts<'a>, Springs);
 
 /// Exchanges the bodies of the lanes in which all bits are set.
 #[inline(always)]
-pub(super) fn exchange<H: HalfIsa>(isa: H, a: &mut [Node], b: &mut [Node], lanes: H::Vector) {
+pub(super) fn exchange<A: Arithmetic>(
+    isa: A,
+    a: &mut [Node<A::Lanes>],
+    b: &mut [Node<A::Lanes>],
+    lanes: A::Vector,
+) {
     for (a, b) in a.iter_mut().zip(b) {
         for (a, b) in a.rows().into_iter().zip(b.rows()) {
             let (old_a, old_b) = (isa.load(a), isa.load(b));
@@ -70,27 +149,33 @@ pub(super) fn exchange<H: HalfIsa>(isa: H, a: &mut [Node], b: &mut [Node], lanes
 
 /// Brings the bodies side by side.
 #[inline(always)]
-pub(super) fn gather<H: HalfIsa>(isa: H, bodies: &[Option<Body<'_>>; HALF], nodes: &mut [Node]) {
+pub(super) fn gather<H: HalfIsa, C: Columns>(
+    isa: H,
+    bodies: &[Option<Body<'_>>],
+    nodes: &mut [Node<C>],
+) {
     let Some((any, _)) = bodies.iter().flatten().next() else { return };
-    // Lanes without a body repeat one.
-    let bodies = bodies.each_ref().map(|body| body.as_ref().map_or(any, |(body, _)| body));
-    for (half, nodes) in nodes.as_chunks_mut::<HALF>().0.iter_mut().enumerate() {
+    for (chunk, nodes) in nodes.as_chunks_mut::<HALF>().0.iter_mut().enumerate() {
         for row in 0..ROWS {
-            let mut rows = [isa.splat(0.0); HALF];
-            for lane in 0..HALF {
-                let KernelParts { positions, velocities, masses, inverse_masses, .. } =
-                    bodies[lane];
-                let values = match row {
-                    0..3 => &positions.components[row],
-                    3..6 => &velocities.components[row - 3],
-                    6 => *masses,
-                    _ => *inverse_masses,
-                };
-                rows[lane] = isa.load(&values[half / 2].as_chunks().0[half % 2]);
-            }
-            let columns = isa.transpose(rows);
-            for lane in 0..HALF {
-                isa.store(columns[lane], nodes[lane].rows()[row]);
+            for half in 0..C::COUNT / HALF {
+                let mut rows = [isa.splat(0.0); HALF];
+                for lane in 0..HALF {
+                    // Lanes without a body repeat one.
+                    let body = &bodies[half * HALF + lane];
+                    let KernelParts { positions, velocities, masses, inverse_masses, .. } =
+                        if let Some((body, _)) = body { body } else { any };
+                    let values = match row {
+                        0..3 => &positions.components[row],
+                        3..6 => &velocities.components[row - 3],
+                        6 => *masses,
+                        _ => *inverse_masses,
+                    };
+                    rows[lane] = isa.load(&values[chunk / 2].as_chunks().0[chunk % 2]);
+                }
+                let columns = isa.transpose(rows);
+                for lane in 0..HALF {
+                    isa.store(columns[lane], &mut nodes[lane].rows()[row].halves_mut()[half]);
+                }
             }
         }
     }
@@ -98,21 +183,28 @@ pub(super) fn gather<H: HalfIsa>(isa: H, bodies: &[Option<Body<'_>>; HALF], node
 
 /// Brings positions and velocities back.
 #[inline(always)]
-pub(super) fn scatter<H: HalfIsa>(isa: H, nodes: &[Node], bodies: &mut [Option<Body<'_>>; HALF]) {
-    for (half, nodes) in nodes.as_chunks::<HALF>().0.iter().enumerate() {
+pub(super) fn scatter<H: HalfIsa, C: Columns>(
+    isa: H,
+    nodes: &[Node<C>],
+    bodies: &mut [Option<Body<'_>>],
+) {
+    for (chunk, nodes) in nodes.as_chunks::<HALF>().0.iter().enumerate() {
         for axis in 0..3 {
-            let mut columns = [[isa.splat(0.0); HALF]; 2];
-            for lane in 0..HALF {
-                columns[0][lane] = isa.load(&nodes[lane].position[axis]);
-                columns[1][lane] = isa.load(&nodes[lane].velocity[axis]);
-            }
-            let [positions, velocities] = [isa.transpose(columns[0]), isa.transpose(columns[1])];
-            for lane in 0..HALF {
-                let Some((body, _)) = &mut bodies[lane] else { continue };
-                let row = &mut body.positions.components[axis][half / 2];
-                isa.store(positions[lane], &mut row.as_chunks_mut().0[half % 2]);
-                let row = &mut body.velocities.components[axis][half / 2];
-                isa.store(velocities[lane], &mut row.as_chunks_mut().0[half % 2]);
+            for half in 0..C::COUNT / HALF {
+                let mut columns = [[isa.splat(0.0); HALF]; 2];
+                for lane in 0..HALF {
+                    columns[0][lane] = isa.load(&nodes[lane].position[axis].halves()[half]);
+                    columns[1][lane] = isa.load(&nodes[lane].velocity[axis].halves()[half]);
+                }
+                let [positions, velocities] =
+                    [isa.transpose(columns[0]), isa.transpose(columns[1])];
+                for lane in 0..HALF {
+                    let Some((body, _)) = &mut bodies[half * HALF + lane] else { continue };
+                    let row = &mut body.positions.components[axis][chunk / 2];
+                    isa.store(positions[lane], &mut row.as_chunks_mut().0[chunk % 2]);
+                    let row = &mut body.velocities.components[axis][chunk / 2];
+                    isa.store(velocities[lane], &mut row.as_chunks_mut().0[chunk % 2]);
+                }
             }
         }
     }
