@@ -28,11 +28,11 @@ use glam::Vec3;
 /// Bodies of a block that all make many substeps.
 const BODIES: usize = 16;
 /// Bodies of one of several blocks: as many as blocks of particles have.
-const MIXED_BODIES: usize = 40;
+const MIXED_BODIES: usize = 64;
 /// So many that the rest of an update (boxes, checks) does not show.
 const SUBSTEPS: u32 = 100;
 /// Blocks of bodies that make few substeps: as many as 300 particles fill.
-const BLOCKS: usize = 8;
+const BLOCKS: usize = 5;
 /// Frames of them, of which all but the first find them in a cache, as in a scene.
 const FRAMES: u64 = 4;
 /// In newton seconds per metre.

@@ -45,7 +45,7 @@ pub const FRAMES_PER_BLOCKING: u64 = 32;
 
 /// The most objects of a block. In larger ones less of the time goes to pairs of blocks, and more to objects
 /// that are nowhere near each other.
-const OBJECTS_PER_BLOCK: usize = 40;
+const OBJECTS_PER_BLOCK: usize = 64;
 /// Objects up to which each is a block of its own: few objects are heavy or uneven ones, and blocks of them
 /// would be too.
 const SINGLE_OBJECTS: usize = 64;
