@@ -20,7 +20,7 @@ mod nrrd;
 mod samples;
 mod stream;
 
-use std::fs::File;
+use std::fs::{self, File, Metadata};
 use std::io::{BufReader, Read};
 use std::path::Path;
 
@@ -55,11 +55,12 @@ impl Image {
     /// It cannot be read, is not a file, or is one of the faults that [`ImageError`] lists.
     pub fn open(path: &Path) -> Result<Self, FileError> {
         let read = || {
+            // To open a pipe is to wait for who writes to it.
+            check_is_file(&fs::metadata(path)?)?;
             let file = File::open(path)?;
+            // Another may stand there by now.
             let metadata = file.metadata()?;
-            if !metadata.is_file() {
-                return Err(ImageError::NotAFile);
-            }
+            check_is_file(&metadata)?;
             Self::read(file, metadata.len())
         };
         read().map_err(|source| FileError { path: path.to_owned(), source })
@@ -131,4 +132,8 @@ impl Image {
         }
         Ok(self.voxels.iter().map(|&hounsfield| thresholds.density(hounsfield)).collect())
     }
+}
+
+fn check_is_file(metadata: &Metadata) -> Result<(), ImageError> {
+    if metadata.is_file() { Ok(()) } else { Err(ImageError::NotAFile) }
 }

@@ -301,6 +301,14 @@ fn paths() {
         let error = Image::open(Path::new("/dev/zero")).expect_err("it has no end");
         assert_eq!(error.to_string(), "/dev/zero: not a file");
     }
+    #[cfg(unix)]
+    {
+        // Whoever opens one is told something else; whoever opens a pipe waits.
+        let path = folder.path().join("socket");
+        let _listener = std::os::unix::net::UnixListener::bind(&path).expect("the folder takes it");
+        let error = Image::open(&path).expect_err("a socket is no file");
+        assert_eq!(error.to_string(), format!("{}: not a file", path.display()));
+    }
 }
 
 #[test]
