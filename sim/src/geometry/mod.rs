@@ -8,6 +8,7 @@ mod mesh;
 mod ray;
 mod rigid;
 mod topology;
+pub(crate) mod union;
 mod vectors;
 mod volume;
 

@@ -123,14 +123,18 @@ impl Image {
     /// `Volume` of voxel bone is made of.
     ///
     /// # Errors
-    /// No voxel reaches the threshold of trabecular bone.
+    /// No voxel reaches the threshold of trabecular bone; no memory.
     pub fn bone(&self, thresholds: &Thresholds) -> Result<Vec<u8>, ImageError> {
         let most = self.voxels.iter().copied().max().unwrap_or(AIR);
         let least = thresholds.trabecular();
         if most < least {
             return Err(ImageError::NoBone { most, least });
         }
-        Ok(self.voxels.iter().map(|&hounsfield| thresholds.density(hounsfield)).collect())
+        let mut densities = Vec::new();
+        let memory = |_| ImageError::Memory { bytes: self.voxels.len() as u64 };
+        densities.try_reserve_exact(self.voxels.len()).map_err(memory)?;
+        densities.extend(self.voxels.iter().map(|&hounsfield| thresholds.density(hounsfield)));
+        Ok(densities)
     }
 }
 

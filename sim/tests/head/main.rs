@@ -234,4 +234,9 @@ fn what_is_not_a_head() {
     assert!(matches!(solid, HeadError::NoRoom { radius } if radius < 0.03), "{solid}");
     let pipe = refused(|_| 1_000);
     assert!(matches!(pipe, HeadError::NoRoom { .. }), "{pipe}");
+    let grid =
+        Grid::new([1_024, 2, 1_024], DAffine3::from_scale(DVec3::splat(0.1))).expect("allowed");
+    let image = Image::new(grid.clone(), vec![0; grid.voxels()]).expect("as many as it has voxels");
+    let house = Head::from_ct(image, &Thresholds::default()).expect_err("too large for a person");
+    assert!(matches!(house, HeadError::Size { volume } if volume > 2_000.0), "{house}");
 }

@@ -1,12 +1,12 @@
 //! The connected parts of a volume: what a closed cut has freed.
 //!
-//! Two passes over runs of solid voxels with union–find, as L. He, Y. Chao, K. Suzuki, "A run-based
-//! two-scan labeling algorithm", IEEE Trans. Image Process. 17 (2008) 749, in three dimensions.
+//! Two passes over runs of solid voxels with [union–find](Union), in three dimensions.
 
 use std::cmp::Reverse;
 use std::ops::Range;
 
 use super::Volume;
+use crate::geometry::union::Union;
 
 /// A voxel is solid from this density on, of 255; usually 128: one half, as for the surface.
 const SOLID: u8 = 128;
@@ -85,7 +85,7 @@ impl Volume {
         if within.iter().any(Range::is_empty) {
             return Vec::new();
         }
-        let (runs, union) = self.joined_runs(&within);
+        let (runs, mut union) = self.joined_runs(&within);
         let mut parts: Vec<Part> = Vec::new();
         let mut numbers = vec![u32::MAX; runs.len()];
         for (index, run) in runs.into_iter().enumerate() {
@@ -113,7 +113,7 @@ impl Volume {
                 let own = first..runs.len();
                 union.grow(runs.len());
                 for other in [behind, below[row].clone()] {
-                    union.join_rows(&runs, own.clone(), other);
+                    union.join_rows(|run| runs[run].xs.clone(), own.clone(), other);
                 }
                 below[row] = own.clone();
                 behind = own;
@@ -131,49 +131,6 @@ impl Volume {
                     Some(run) if run.xs.end == x => run.xs.end += 1,
                     _ => runs.push(Run { xs: x..x + 1, y, z }),
                 }
-            }
-        }
-    }
-}
-
-/// Which runs hang together: each knows one of lower number, up to a root, which knows itself.
-#[derive(Default)]
-struct Union {
-    parents: Vec<u32>,
-}
-
-impl Union {
-    fn grow(&mut self, runs: usize) {
-        self.parents.extend(self.parents.len() as u32..runs as u32);
-    }
-
-    fn root(&self, mut run: u32) -> u32 {
-        while self.parents[run as usize] != run {
-            run = self.parents[run as usize];
-        }
-        run
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        let (low, high) = (self.root(a).min(self.root(b)), self.root(a).max(self.root(b)));
-        self.parents[high as usize] = low;
-        // So that the ways to the roots stay short.
-        self.parents[a as usize] = low;
-        self.parents[b as usize] = low;
-    }
-
-    /// Joins the runs of two neighbouring rows where they overlap.
-    fn join_rows(&mut self, runs: &[Run], own: Range<usize>, other: Range<usize>) {
-        let (mut a, mut b) = (own.start, other.start);
-        while a < own.end && b < other.end {
-            let (one, two) = (&runs[a].xs, &runs[b].xs);
-            if one.start < two.end && two.start < one.end {
-                self.join(a as u32, b as u32);
-            }
-            if one.end < two.end {
-                a += 1;
-            } else {
-                b += 1;
             }
         }
     }

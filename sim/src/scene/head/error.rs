@@ -31,6 +31,21 @@ pub enum HeadError {
         /// The share of the directions in which there is bone.
         share: f32,
     },
+    /// Bone is in more separate places than in any head.
+    #[error(
+        "no head: its bone is in more than {} rows of voxels side by side; a head's is in a few millions",
+        HeadError::MAX_RUNS
+    )]
+    Runs,
+    /// The image is of more than a person.
+    #[error(
+        "no head: the image is of {volume} m³; it may be of {} m³, twice a whole person's",
+        HeadError::MAX_VOLUME
+    )]
+    Size {
+        /// What the image covers, in cubic metres.
+        volume: f64,
+    },
     /// The volume of bone cannot be built.
     #[error(transparent)]
     Volume(#[from] VolumeError),
@@ -48,4 +63,12 @@ pub enum HeadError {
         /// Its name.
         name: &'static str,
     },
+}
+
+impl HeadError {
+    /// The most rows of bone voxels side by side that an image is searched for a skull in: 2²⁴. A head of
+    /// 512 × 512 × 1,000 voxels has some 3 million; noise has more.
+    pub const MAX_RUNS: usize = 1 << 24;
+    /// The most that an image may cover, in cubic metres.
+    pub const MAX_VOLUME: f64 = 1.0;
 }

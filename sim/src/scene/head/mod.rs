@@ -79,12 +79,17 @@ impl Head {
     /// The head in an image of computed tomography.
     ///
     /// # Errors
-    /// No bone; no room with bone around it in which a brain could be; a structure of which nothing is
-    /// in the image.
+    /// No bone, or in more places than [`HeadError::MAX_RUNS`]; an image of more than
+    /// [`HeadError::MAX_VOLUME`]; no memory; no room with bone around it in which a brain could be; a structure
+    /// of which nothing is in the image.
     pub fn from_ct(image: Image, thresholds: &Thresholds) -> Result<Self, HeadError> {
         let (grid, dims) = (image.grid().clone(), image.grid().dims());
+        let volume = grid.spacing().element_product() * grid.voxels() as f64;
+        if volume > HeadError::MAX_VOLUME {
+            return Err(HeadError::Size { volume });
+        }
         let mut densities = image.bone(thresholds)?;
-        component::keep_largest(&mut densities, dims);
+        component::keep_largest(&mut densities, dims)?;
         let (seed, room) = largest_room(&grid, &densities, image.voxels(), thresholds.air());
         if !Self::ROOM.contains(&room) {
             return Err(HeadError::NoRoom { radius: room });
