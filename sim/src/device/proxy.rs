@@ -27,7 +27,8 @@ pub(super) const REACH: f32 = 0.02;
 /// A closed or an endless surface: positive outside, negative inside.
 pub trait Surface {
     /// The distance to the surface, in metres, or a field that is about it near the surface, and its
-    /// gradient, which points outward and need not be of unit length.
+    /// gradient, which points outward and need not be of unit length. Where the surface is out of reach, the
+    /// distance is infinite, negative inside, and the gradient 0.
     fn distance(&self, point: Vec3) -> (f32, Vec3);
 }
 
@@ -98,8 +99,8 @@ impl Proxy {
         if !self.touches {
             self.position = tool;
             self.normal = None;
-            if distance < REACH {
-                self.settle(surface);
+            if distance < REACH && !self.settle(surface) {
+                *self = Self::new(tool);
             }
             return;
         }
@@ -109,24 +110,30 @@ impl Proxy {
             let normal = self.normal.unwrap_or_default();
             let way = tool - self.position;
             self.position += way - normal * way.dot(normal);
-            self.settle(surface);
+            if !self.settle(surface) {
+                // What it lay on is gone.
+                *self = Self::new(tool);
+                return;
+            }
             if self.position.distance(before) < TOLERANCE {
                 break;
             }
         }
     }
 
-    /// Goes onto the surface along the gradient, by Newton's method.
-    fn settle(&mut self, surface: &impl Surface) {
+    /// Goes onto the surface along the gradient, by Newton's method. Whether there is any near.
+    fn settle(&mut self, surface: &impl Surface) -> bool {
         for _ in 0..STEPS {
             let (distance, gradient) = surface.distance(self.position);
-            let Some(normal) = gradient.try_normalize() else { return };
+            // Deep inside no gradient is known, either, and what was found before holds on.
+            let Some(normal) = gradient.try_normalize() else { return distance < REACH };
             self.normal = Some(normal);
             self.position -= gradient * (distance / gradient.length_squared());
             if distance.abs() < TOLERANCE {
                 break;
             }
         }
+        true
     }
 
     /// The contact's local model for a tool, which the proxy has followed there: `K·(proxy − tool)`, with
@@ -158,10 +165,11 @@ mod tests {
 
     const RADIUS: f32 = 0.07;
 
-    /// A sphere, or a wall of 2 mm in the plane y = 0.
+    /// A sphere, a wall of 2 mm in the plane y = 0, or nothing.
     enum Body {
         Sphere,
         Wall,
+        Nothing,
     }
 
     impl Surface for Body {
@@ -169,6 +177,7 @@ mod tests {
             match self {
                 Self::Sphere => (point.length() - RADIUS, point.normalize_or_zero()),
                 Self::Wall => (point.y.abs() - 1e-3, Vec3::Y * point.y.signum()),
+                Self::Nothing => (f32::INFINITY, Vec3::ZERO),
             }
         }
     }
@@ -205,6 +214,27 @@ mod tests {
         assert!(proxy.position().abs_diff_eq(Vec3::Y * 1e-3, 1e-6), "{}", proxy.position());
         proxy.follow(Vec3::Y * 2e-3, &Body::Wall);
         assert!(!proxy.touches());
+    }
+
+    /// Bone that is taken away from under a tool holds it no longer.
+    #[test]
+    fn lets_go_of_what_is_gone() {
+        let mut link = HapticLink::new();
+        let (_, mut end) = link.split();
+        for depth in [0.5e-3, 3e-3, 30e-3] {
+            let mut proxy = Proxy::new(Vec3::Y * 0.1);
+            proxy.follow(Vec3::Y * (RADIUS - depth), &Body::Sphere);
+            assert!(proxy.touches());
+            let sample = DeviceSample::at(Vec3::Y * (RADIUS - 2.0 * depth));
+            proxy.follow(sample.position, &Body::Nothing);
+            assert_eq!(proxy, Proxy::new(sample.position), "{depth} m deep");
+            let tool = ToolState { sample, ..end.tool() };
+            let model = proxy.model(&tool, ContactStiffness::BONE);
+            assert_eq!(model.force_at(sample.position), Vec3::ZERO);
+            assert_eq!(proxy.held_out(Vec3::ZERO), Vec3::ZERO);
+            proxy.follow(Vec3::Y * (RADIUS - depth), &Body::Sphere);
+            assert!(proxy.touches(), "it is felt again");
+        }
     }
 
     #[test]
