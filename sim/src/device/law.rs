@@ -21,7 +21,7 @@ pub struct ForceSettings {
     /// How long a new model takes to come in, in seconds. Usually 1/60: a frame.
     pub entry: f64,
     /// How long after its predecessor a model may come before forces fade, in seconds. Usually 0.05:
-    /// three frames of 1/60 s.
+    /// three frames of 1/60 s. Where models come more slowly it is three times the last interval, at most 0.25 s.
     pub timeout: f64,
     /// How long forces take to fade when no model comes, and to come in when one comes then, in seconds.
     /// Usually 0.1: about as fast as a hand reacts to a touch, so that it neither jerks nor sinks far.
@@ -248,6 +248,29 @@ mod tests {
         }
         assert!(forces[9] < 9.0 * 0.51 && smooth(&forces), "{forces:?}");
         assert!(forces[11] - forces[9] < 0.8, "{forces:?}");
+    }
+
+    /// A pipeline, or a loop, that is slow shows a hand at rest a force at rest; when it stalls, the force fades.
+    #[test]
+    fn a_slow_pipeline_is_no_stall() {
+        let inside = DeviceSample::at(Vec3::Y * -2e-3);
+        for (rate, models) in [(1e3, 15.0), (1e3, 10.0), (1e3, 5.0), (15.0, 15.0), (5.0, 5.0)] {
+            let mut law = law();
+            let mut forces = |from: f64, to: f64, last: f64| -> Vec<f32> {
+                let ticks = (from * rate) as u64..(to * rate) as u64;
+                let times = ticks.map(|tick| tick as f64 / rate);
+                let number = |time: f64| 1 + (time.min(last) * models + 1e-6) as u64;
+                times.map(|time| law.step(time, &inside, (number(time), &WALL)).force.y).collect()
+            };
+            let case = format!("{models} models a second in {rate} ticks");
+            let came = forces(0.0, 2.0, 2.0);
+            assert!(smooth(&came), "{case}: {came:?}");
+            let rests = forces(2.0, 4.0, 4.0);
+            assert!(rests.iter().all(|force| (force - 2.0).abs() < 1e-3), "{case}: {rests:?}");
+            let stalled = forces(4.0, 6.0, 4.0);
+            let stuck = stalled.iter().skip((0.4 * rate) as usize + 5).find(|&&force| force > 0.0);
+            assert!(smooth(&stalled) && stuck.is_none(), "{case}: {stalled:?}");
+        }
     }
 
     #[test]
