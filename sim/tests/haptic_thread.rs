@@ -2,7 +2,7 @@
 //! a device's error. No times are asserted.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::thread::{scope, sleep};
 use std::time::Duration;
 
@@ -101,6 +101,57 @@ fn goes_on_after_errors() {
         assert_eq!(tool.sample.position, Vec3::X, "the last place that it told");
         let tool = until(&mut simulation, |tool| tool.fault.is_none() && tool.ticks.failed > 3);
         assert!(tool.ticks.failed < tool.ticks.due);
+    });
+}
+
+/// A device that is pressed 5 mm deep into what the simulation tells, and whose driver panics as soon as a force is
+/// exerted. It keeps the last force.
+struct Panicking(Arc<AtomicU32>);
+
+impl HapticDevice for Panicking {
+    fn description(&self) -> DeviceDescription {
+        SimulatedDevice::DESCRIPTION
+    }
+
+    fn read(&mut self, _time: f64) -> Result<DeviceSample, DeviceError> {
+        assert_eq!(self.0.load(Ordering::SeqCst), 0, "a force is exerted");
+        Ok(DeviceSample::at(Vec3::Y * -5e-3))
+    }
+
+    fn write(&mut self, wrench: Wrench) -> Result<(), DeviceError> {
+        self.0.store(wrench.force.length().to_bits(), Ordering::SeqCst);
+        Ok(())
+    }
+}
+
+#[test]
+fn a_driver_that_panics_lets_go_and_is_told() {
+    let mut link = HapticLink::new();
+    let (end, mut simulation) = link.split();
+    let force = Arc::new(AtomicU32::new(0));
+    let device = Panicking(Arc::clone(&force));
+    scope(|scope| {
+        let settings = ForceSettings::default();
+        let haptics = HapticThread::spawn(scope, device, end, settings, RATE).expect("it starts");
+        let force = Vec3::Y * 5.0;
+        simulation.deliver(LocalModel { force, ..LocalModel::FREE }).expect("finite");
+        let told = until(&mut simulation, |tool| tool.fault.is_some());
+        assert_eq!(told.fault, Some(DeviceError::Panicked));
+        assert_eq!((told.wrench, told.ticks.failed), (Wrench::default(), 1));
+        assert!(told.time > 0.0 && told.sample.position == Vec3::Y * -5e-3);
+        drop(haptics);
+    });
+    assert_eq!(f32::from_bits(force.load(Ordering::SeqCst)), 0.0, "the force stays on the hand");
+}
+
+#[test]
+fn a_loop_that_is_too_slow_is_refused() {
+    let (mut link, mut mouse) = (HapticLink::new(), Mouse::new(Vec3::ZERO));
+    let ((end, _), (_, device)) = (link.split(), mouse.split());
+    scope(|scope| {
+        let spawned = HapticThread::spawn(scope, device, end, ForceSettings::default(), 99.0);
+        let error = spawned.expect_err("no such rate");
+        assert_eq!(error.to_string(), "a haptic loop at 99 Hz: mouse takes 100 to 4000 Hz");
     });
 }
 

@@ -118,6 +118,9 @@ pub enum DeviceError {
     /// A position or an orientation that is no number.
     #[error("the device told a pose that is not finite")]
     NonFinite,
+    /// The driver panicked: the loop is over.
+    #[error("the device's driver has panicked, and its haptic loop is over")]
+    Panicked,
     /// The driver's own error, by its number.
     #[error("the device's driver says error {code}")]
     Driver {

@@ -1,5 +1,6 @@
 //! The haptic loop's own light thread.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::thread::{Builder, Scope, ScopedJoinHandle, sleep};
@@ -17,6 +18,9 @@ use super::{DeviceError, DeviceSample, HapticDevice, Wrench};
 /// The usual rate of the loop, in hertz: 1,000 (§6.3). Stiff contact asks for it; the skin feels up to
 /// about that.
 pub const RATE: f64 = 1_000.0;
+/// The least rate of the loop, in hertz: 100. At less, the damping that bone of K = 2 kN/m takes to be passive, K·T/2,
+/// is more than a device of m = 0.1 kg bears, m/T.
+pub const MIN_RATE: f64 = 100.0;
 /// The greatest rate of the loop, in hertz: 4,000, the most that desktop devices take.
 pub const MAX_RATE: f64 = 4_000.0;
 
@@ -48,6 +52,8 @@ pub struct HapticLoop<'c, D> {
     device: D,
     end: LoopEnd<'c>,
     law: ForceLaw,
+    /// Of the last tick.
+    time: f64,
     sample: DeviceSample,
     ticks: Ticks,
 }
@@ -57,7 +63,7 @@ impl<'c, D: HapticDevice> HapticLoop<'c, D> {
     pub fn new(device: D, end: LoopEnd<'c>, settings: ForceSettings) -> Self {
         let law = ForceLaw::new(device.description(), settings);
         let sample = DeviceSample::at(glam::Vec3::ZERO);
-        Self { device, end, law, sample, ticks: Ticks::default() }
+        Self { device, end, law, time: 0.0, sample, ticks: Ticks::default() }
     }
 
     /// A tick at `time` seconds on the loop's clock, which must be more than at the tick before. It never
@@ -69,6 +75,7 @@ impl<'c, D: HapticDevice> HapticLoop<'c, D> {
     }
 
     fn exert(&mut self, time: f64) -> Wrench {
+        self.time = time;
         let (number, model) = self.end.model();
         let read = self.device.read(time).and_then(|sample| {
             if sample.is_finite() { Ok(sample) } else { Err(DeviceError::NonFinite) }
@@ -79,11 +86,15 @@ impl<'c, D: HapticDevice> HapticLoop<'c, D> {
         };
         let written = self.device.write(wrench);
         self.sample = read.unwrap_or(self.sample);
-        let fault = read.err().or(written.err());
-        self.ticks.failed += u64::from(fault.is_some());
-        let (sample, ticks, forces) = (self.sample, self.ticks, *self.law.forces());
-        self.end.publish(ToolState { time, sample, wrench, fault, ticks, forces });
+        self.publish(wrench, read.err().or(written.err()));
         wrench
+    }
+
+    fn publish(&mut self, wrench: Wrench, fault: Option<DeviceError>) {
+        self.ticks.failed += u64::from(fault.is_some());
+        let (time, sample, ticks, forces) =
+            (self.time, self.sample, self.ticks, *self.law.forces());
+        self.end.publish(ToolState { time, sample, wrench, fault, ticks, forces });
     }
 
     /// The device.
@@ -93,7 +104,8 @@ impl<'c, D: HapticDevice> HapticLoop<'c, D> {
 }
 
 /// The haptic loop in a thread. It sleeps between ticks, takes no lock, and waits for nobody but the
-/// device. Dropping it stops the loop, lets the device go without force, and joins the thread.
+/// device. Dropping it stops the loop, lets the device go without force, and joins the thread. A driver that panics
+/// ends the loop: the device is let go, and the simulation sees [`DeviceError::Panicked`].
 #[derive(Debug)]
 pub struct HapticThread<'scope> {
     stop: Arc<AtomicBool>,
@@ -105,7 +117,7 @@ impl<'scope> HapticThread<'scope> {
     /// Starts a loop at `rate` hertz, usually [`RATE`].
     ///
     /// # Errors
-    /// A rate that is not the device's or is above [`MAX_RATE`], a thread that cannot be had.
+    /// A rate that is not the device's, is below [`MIN_RATE`] or above [`MAX_RATE`], a thread that cannot be had.
     pub fn spawn<D: HapticDevice + 'scope>(
         scope: &'scope Scope<'scope, '_>,
         device: D,
@@ -114,7 +126,8 @@ impl<'scope> HapticThread<'scope> {
         rate: f64,
     ) -> Result<Self, LoopError> {
         let description = device.description();
-        let [least, most] = [description.rates[0], description.rates[1].min(MAX_RATE)];
+        let [least, most] = description.rates;
+        let [least, most] = [least.max(MIN_RATE), most.min(MAX_RATE)];
         if !(least..=most).contains(&rate) {
             return Err(LoopError::Rate { rate, device: description.name, least, most });
         }
@@ -146,16 +159,27 @@ impl Drop for HapticThread<'_> {
         // Relaxed: the flag orders nothing, and the thread that sees it late stops late.
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A driver that panicked has ended the loop already; its message was printed.
+            // A driver that panicked has ended the loop already, and the simulation was told.
             let _ = thread.join();
         }
     }
 }
 
 impl<D: HapticDevice> HapticLoop<'_, D> {
-    /// Ticks every `period` until it is told to stop. A tick that comes too late for the next one
-    /// leaves that one out: ticks in a burst would be ticks of no time.
+    /// Ticks every `period` until it is told to stop, or the driver panics; either way the device lets go.
     fn run(&mut self, period: Duration, stop: &AtomicBool) {
+        // What a panic leaves half done is only told from here on.
+        let ticking = catch_unwind(AssertUnwindSafe(|| self.tick_until(period, stop)));
+        // A device that cannot be told to let go now lets go by its own watchdog.
+        let _ = catch_unwind(AssertUnwindSafe(|| self.device.write(Wrench::default())));
+        if ticking.is_err() {
+            self.publish(Wrench::default(), Some(DeviceError::Panicked));
+        }
+    }
+
+    /// A tick that comes too late for the next one leaves that one out: ticks in a burst would be ticks of
+    /// no time.
+    fn tick_until(&mut self, period: Duration, stop: &AtomicBool) {
         let began = Instant::now();
         let mut due = began;
         while !stop.load(Ordering::Relaxed) {
@@ -167,8 +191,6 @@ impl<D: HapticDevice> HapticLoop<'_, D> {
             self.exert(now.duration_since(began).as_secs_f64());
             due += period * (missed + 1);
         }
-        // A device that cannot be told to let go now lets go by its own watchdog.
-        let _ = self.device.write(Wrench::default());
     }
 }
 
