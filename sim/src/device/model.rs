@@ -30,6 +30,10 @@ pub struct LocalModel {
     /// along it, there is no force. So a model may already hold before the tool touches, with the
     /// negative force that Eq. 1 gives for the gap. None for tissue that is held and pulls both ways.
     pub normal: Option<Vec3>,
+    /// Beside a contact that only pushes, the force at P_N of what pulls both ways, in newtons.
+    pub pull: Vec3,
+    /// Its gradient, in newtons per metre.
+    pub pull_gradient: Mat3,
 }
 
 /// A local model that is no model.
@@ -49,6 +53,8 @@ impl LocalModel {
         position: Vec3::ZERO,
         time: 0.0,
         normal: None,
+        pull: Vec3::ZERO,
+        pull_gradient: Mat3::ZERO,
     };
 
     /// The model itself if every number in it is finite.
@@ -56,20 +62,42 @@ impl LocalModel {
     /// # Errors
     /// [`ModelError::NonFinite`] if one is not.
     pub fn checked(self) -> Result<Self, ModelError> {
-        let vectors = [self.force, self.torque, self.position, self.normal.unwrap_or_default()];
+        let normal = self.normal.unwrap_or_default();
+        let vectors = [self.force, self.torque, self.position, normal, self.pull];
         let finite = vectors.iter().all(|vector| vector.is_finite())
             && self.gradient.is_finite()
+            && self.pull_gradient.is_finite()
             && self.time.is_finite();
         if finite { Ok(self) } else { Err(ModelError::NonFinite) }
+    }
+
+    /// The same beside something that pulls both ways, of which `other` is a model without a normal.
+    #[must_use]
+    pub fn beside(self, other: &Self) -> Self {
+        let pull = self.pull + other.force_at(self.position);
+        Self { pull, pull_gradient: self.pull_gradient + other.gradient, ..self }
     }
 
     /// The model's force at a place, in newtons: Eq. 1, and nothing where a contact would pull.
     #[must_use]
     pub fn force_at(&self, position: Vec3) -> Vec3 {
-        let force = self.force + self.gradient * (position - self.position);
-        let pulls = self.normal.is_some_and(|normal| force.dot(normal) <= 0.0);
-        if pulls { Vec3::ZERO } else { force }
+        let [contact, pull] = self.forces_at(position);
+        contact + pull
     }
+
+    /// The contact's force, and that of what pulls beside it.
+    fn forces_at(&self, position: Vec3) -> [Vec3; 2] {
+        let way = position - self.position;
+        let force = self.force + self.gradient * way;
+        let pulls = self.normal.is_some_and(|normal| force.dot(normal) <= 0.0);
+        let contact = if pulls { Vec3::ZERO } else { force };
+        [contact, self.pull + self.pull_gradient * way]
+    }
+}
+
+/// The projection on a direction of unit length.
+pub(crate) fn along(normal: Vec3) -> Mat3 {
+    Mat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z)
 }
 
 /// A local model within what a device can show: symmetric, no direction stiffer than the device allows,
@@ -79,25 +107,26 @@ impl LocalModel {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounded {
     model: LocalModel,
-    /// The pseudo-inverse of the stiffness, in metres per newton.
-    compliance: DMat3,
+    /// The pseudo-inverses of the contact's stiffness, and of that of what pulls, in metres per newton.
+    compliances: [DMat3; 2],
     max_force: f32,
 }
 
 impl Bounded {
     pub(super) fn new(model: LocalModel, device: &DeviceDescription) -> Self {
-        let symmetric = (model.gradient + model.gradient.transpose()) * 0.5;
-        let (values, vectors) = principal(symmetric.as_dmat3());
         let most = f64::from(device.max_stiffness);
-        let stiffness = (-values).clamp(DVec3::ZERO, DVec3::splat(most));
-        let inverse = |k: f64| if k < LEAST_STIFFNESS { 0.0 } else { 1.0 / k };
-        let of = |diagonal: DVec3| vectors * DMat3::from_diagonal(diagonal) * vectors.transpose();
-        // A contact that is shown softer begins where it did.
-        let shown = of((-values).map(|k| if k > most { most / k } else { 1.0 }));
-        let force = (shown * model.force.as_dvec3()).as_vec3();
+        let pull = Spring::new(model.pull, model.pull_gradient, most);
+        // Both act at once, and together are not to be too stiff.
+        let contact = Spring::new(model.force, model.gradient, most - pull.stiffest);
         Self {
-            model: LocalModel { force, gradient: -of(stiffness).as_mat3(), ..model },
-            compliance: of(stiffness.map(inverse)),
+            model: LocalModel {
+                force: contact.force,
+                gradient: contact.gradient,
+                pull: pull.force,
+                pull_gradient: pull.gradient,
+                ..model
+            },
+            compliances: [contact.compliance, pull.compliance],
             max_force: device.max_force,
         }
     }
@@ -114,10 +143,38 @@ impl Bounded {
     /// The energy stored at a place, in joules: fᵀK⁻¹f/2 for the force f of Eq. 1. Where the force is
     /// held at the device's greatest, S, only what that force gives back: of a spring, S/K·(|f| − S/2).
     pub(super) fn energy_at(&self, position: Vec3) -> f64 {
-        let force = self.model.force_at(position).as_dvec3();
-        let elastic = 0.5 * force.dot(self.compliance * force);
-        let share = f64::from(self.max_force) / force.length();
+        let forces = self.model.forces_at(position).map(|force| force.as_dvec3());
+        let springs = forces.into_iter().zip(&self.compliances);
+        let elastic: f64 = springs.map(|(f, &compliance)| 0.5 * f.dot(compliance * f)).sum();
+        let share = f64::from(self.max_force) / (forces[0] + forces[1]).length();
         if share < 1.0 { elastic * share * (2.0 - share) } else { elastic }
+    }
+}
+
+/// A force and its gradient within bounds.
+struct Spring {
+    force: Vec3,
+    gradient: Mat3,
+    compliance: DMat3,
+    /// The greatest stiffness along any direction, in newtons per metre.
+    stiffest: f64,
+}
+
+impl Spring {
+    fn new(force: Vec3, gradient: Mat3, most: f64) -> Self {
+        let symmetric = (gradient + gradient.transpose()) * 0.5;
+        let (values, vectors) = principal(symmetric.as_dmat3());
+        let stiffness = (-values).clamp(DVec3::ZERO, DVec3::splat(most));
+        let inverse = |k: f64| if k < LEAST_STIFFNESS { 0.0 } else { 1.0 / k };
+        let of = |diagonal: DVec3| vectors * DMat3::from_diagonal(diagonal) * vectors.transpose();
+        // A contact that is shown softer begins where it did.
+        let shown = of((-values).map(|k| if k > most { most / k } else { 1.0 }));
+        Self {
+            force: (shown * force.as_dvec3()).as_vec3(),
+            gradient: -of(stiffness).as_mat3(),
+            compliance: of(stiffness.map(inverse)),
+            stiffest: stiffness.max_element(),
+        }
     }
 }
 
@@ -143,6 +200,30 @@ mod tests {
         assert_eq!(model.force_at(Vec3::Y * 2e-3), Vec3::ZERO);
         let held = LocalModel { normal: None, ..model };
         assert_eq!(held.force_at(Vec3::Y * 2e-3), -Vec3::Y);
+    }
+
+    /// Tissue that is held pulls on where the contact beside it has ended, and both have their energy.
+    #[test]
+    fn a_pull_beside_a_contact() {
+        let held = LocalModel {
+            force: Vec3::new(0.5, -0.3, 0.0),
+            gradient: Mat3::from_diagonal(Vec3::splat(-100.0)),
+            position: Vec3::Y * 1e-3,
+            ..LocalModel::FREE
+        };
+        let both = wall(1_000.0).beside(&held);
+        for model in [both, *Bounded::new(both, &SimulatedDevice::DESCRIPTION).model()] {
+            let force = model.force_at(Vec3::ZERO);
+            assert!(force.abs_diff_eq(Vec3::new(0.5, 0.8, 0.0), 1e-5), "{force} inside");
+            let force = model.force_at(Vec3::Y * 3e-3);
+            assert!(force.abs_diff_eq(Vec3::new(0.5, -0.5, 0.0), 1e-5), "{force} outside");
+        }
+        let device = SimulatedDevice::DESCRIPTION;
+        let energy = |model| Bounded::new(model, &device).energy_at(Vec3::ZERO);
+        assert!((energy(both) - energy(wall(1_000.0)) - energy(held)).abs() < 1e-9);
+        let stiff = Bounded::new(wall(1e5).beside(&held), &device);
+        let gradient = stiff.model().gradient + stiff.model().pull_gradient;
+        assert!((gradient.y_axis.y + device.max_stiffness).abs() < 0.1, "{gradient}");
     }
 
     #[test]

@@ -10,10 +10,10 @@
 //! Near the surface the proxy is on it already, and its model holds for the gap: however late the
 //! model comes, the haptic loop knows where contact begins.
 
-use glam::{Mat3, Vec3};
+use glam::Vec3;
 
 use super::link::ToolState;
-use super::model::LocalModel;
+use super::model::{LocalModel, along};
 
 /// Newton steps onto the surface, and tangential moves, for each time the proxy follows. Usually 8: a tool
 /// that moved 5 mm along a skull of 7 cm radius is followed to 1 µm in 3.
@@ -145,14 +145,13 @@ impl Proxy {
             return LocalModel { position, time, ..LocalModel::FREE };
         };
         let ContactStiffness(stiffness) = stiffness;
-        let along = normal * (-stiffness);
         LocalModel {
             force: (self.position - position) * stiffness,
-            torque: Vec3::ZERO,
-            gradient: Mat3::from_cols(along * normal.x, along * normal.y, along * normal.z),
+            gradient: along(normal) * -stiffness,
             position,
             time,
             normal: Some(normal),
+            ..LocalModel::FREE
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::behavior::drill::Coupling;
 use crate::behavior::{Tool, Work};
 use crate::device::DeviceSample;
 use crate::device::link::{SimulationEnd, ToolState};
-use crate::device::model::LocalModel;
+use crate::device::model::{LocalModel, along};
 use crate::device::proxy::{ContactStiffness, Proxy};
 use crate::object::{Object, ObjectId};
 
@@ -184,8 +184,12 @@ impl<'c> Feel<'c> {
         let rub = press.map(|press| [FRICTION * press, FRICTION_GIVES]);
         let rub = tool.follow(&device, rub, normal);
         let acts = |part: &LocalModel| part.force_at(device.sample.position) != Vec3::ZERO;
-        let parts = [held, cut, Some(bone), rub, dura];
-        Some(parts.into_iter().flatten().filter(acts).reduce(sum).unwrap_or(bone))
+        let together = |parts: [_; 3]| parts.into_iter().flatten().filter(acts).reduce(sum);
+        // What only pushes has an end where what pulls has none.
+        Some(match (together([Some(bone), rub, dura]), together([held, cut, None])) {
+            (Some(contact), Some(pull)) => contact.beside(&pull),
+            (contact, pull) => contact.or(pull).unwrap_or(bone),
+        })
     }
 
     /// Of bone that a drill is in with its tip.
@@ -274,16 +278,11 @@ impl Drag {
     }
 }
 
-/// The projection on a direction of unit length.
-fn along(normal: Vec3) -> Mat3 {
-    Mat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z)
-}
-
 /// A spring that exerts `force` on a tool where the device was `then`.
 fn spring(force: Vec3, stiffness: f32, normal: Option<Vec3>, then: &ToolState) -> LocalModel {
     let (position, time) = (then.sample.position, then.time);
     let gradient = Mat3::from_diagonal(Vec3::splat(-stiffness));
-    LocalModel { force, torque: Vec3::ZERO, gradient, position, time, normal }
+    LocalModel { force, gradient, position, time, normal, ..LocalModel::FREE }
 }
 
 /// Both together, where the first one holds.
@@ -291,4 +290,49 @@ fn sum(first: LocalModel, other: LocalModel) -> LocalModel {
     let there = other.force + other.gradient * (first.position - other.position);
     let (force, gradient) = (first.force + there, first.gradient + other.gradient);
     LocalModel { force, gradient, ..first }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::law::ForceSettings;
+    use crate::device::link::HapticLink;
+    use crate::device::motion::{Motion, ScriptedDevice};
+    use crate::device::proxy::Surface;
+    use crate::device::thread::HapticLoop;
+
+    /// Bone below y = 0.
+    struct Flat;
+
+    impl Surface for Flat {
+        fn distance(&self, point: Vec3) -> (f32, Vec3) {
+            (point.y, Vec3::Y)
+        }
+    }
+
+    /// A tool that cuts, 1 mm deep in bone: what it cuts holds it back, but bone does not when it goes out.
+    #[test]
+    fn bone_only_pushes_also_beside_what_is_cut() {
+        let mut link = HapticLink::new();
+        let (end, simulation) = link.split();
+        let mut feel = Feel::new(simulation);
+        let place = Vec3::Y * -1e-3;
+        let device = ScriptedDevice::new(Motion::at_rest(place).expect("finite"));
+        HapticLoop::new(device, end, ForceSettings::default()).tick(0.1);
+        let mut proxy = Proxy::new(Vec3::Y);
+        proxy.follow(place, &Flat);
+        feel.proxies.push((SKULL, proxy));
+        let work = Work { cuts: true, ..Work::default() };
+        feel.tool = Some(Seen { tip: place, work, coupling: None, push: None });
+        // It takes a first look for the blade to be held somewhere.
+        feel.model().expect("a device and a tool");
+        let [blade, _] = &mut feel.drags;
+        blade.anchor = Some(place + Vec3::X * 1e-3);
+        let model = feel.model().expect("a device and a tool");
+        let inside = model.force_at(place);
+        assert!((inside.y - 2.0).abs() < 1e-3 && inside.x > 0.3, "{inside}");
+        let outside = model.force_at(Vec3::Y * 1e-3);
+        let cut = CUTTING / CUTTING_GIVES * 2e-3;
+        assert!((outside.y + cut).abs() < 1e-3 && outside.x > 0.3, "{outside}");
+    }
 }
