@@ -74,6 +74,15 @@ pub enum SceneError {
         /// The number asked for.
         objects: usize,
     },
+    /// No substep, or too many.
+    #[error(
+        "up to {substeps} substeps a frame were asked for; there can be 1 to {}",
+        ParticleScene::MAX_SUBSTEPS
+    )]
+    Substeps {
+        /// The number asked for.
+        substeps: u32,
+    },
     /// A behaviour was refused.
     #[error(transparent)]
     MassSpring(#[from] MassSpringError),
@@ -105,14 +114,18 @@ pub struct ParticleScene {
     /// Whether springs, contacts and walls are damped and walls have friction. Without, energy is
     /// kept, up to the integrator's oscillation around it.
     pub damping: bool,
-    /// The most substeps a frame, at least 1; usually 10 (§7.1.1). Each particle's are drawn from 1 to
-    /// this.
+    /// The most substeps a frame, 1 to [`ParticleScene::MAX_SUBSTEPS`]; usually 10 (§7.1.1). Each particle's are
+    /// drawn from 1 to this.
     pub most_substeps: u32,
 }
 
 impl ParticleScene {
     /// The most particles: what blocks can hold, less the walls.
     pub const MAX_OBJECTS: usize = Blocking::MAX_OBJECTS - 6;
+
+    /// The most substeps a frame: ten times what experiments with uneven objects take. A frame of as many
+    /// particles as there can be still ends.
+    pub const MAX_SUBSTEPS: u32 = 1_000;
 
     /// The time from one frame to the next, in seconds; usually 1/240.
     pub const TIME_STEP: f32 = 1.0 / 240.0;
@@ -133,13 +146,14 @@ impl ParticleScene {
     /// Builds the objects and the rules.
     ///
     /// # Errors
-    /// No particle, or more than [`ParticleScene::MAX_OBJECTS`]; no substeps.
+    /// No particle, or more than [`ParticleScene::MAX_OBJECTS`]; no substeps, or more than
+    /// [`ParticleScene::MAX_SUBSTEPS`].
     pub fn build(&self) -> Result<Scene, SceneError> {
         if !(1..=Self::MAX_OBJECTS).contains(&self.objects) {
             return Err(SceneError::Objects { objects: self.objects });
         }
-        if self.most_substeps == 0 {
-            return Err(MassSpringError::NoSubsteps.into());
+        if !(1..=Self::MAX_SUBSTEPS).contains(&self.most_substeps) {
+            return Err(SceneError::Substeps { substeps: self.most_substeps });
         }
         let centers = lattice(self.objects);
         let mut objects = self.particles(&centers)?;
@@ -300,6 +314,10 @@ mod tests {
     fn limits() {
         assert!(ParticleScene::new(0).build().is_err());
         assert!(ParticleScene::new(ParticleScene::MAX_OBJECTS + 1).build().is_err());
+        for substeps in [0, ParticleScene::MAX_SUBSTEPS + 1, u32::MAX] {
+            let scene = ParticleScene { most_substeps: substeps, ..ParticleScene::new(5) };
+            assert_eq!(scene.build().err(), Some(SceneError::Substeps { substeps }));
+        }
         let scene = ParticleScene::new(1).build().expect("one particle is allowed");
         assert_eq!(scene.objects.len(), 7);
         let mesh = scene.objects[0].geometry.as_mesh().expect("a particle is a mesh");
