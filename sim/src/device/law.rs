@@ -65,9 +65,22 @@ pub struct ForceLaw {
     passivity: Passivity,
     /// The time and the place of the last sample. None before the first one and after a lost one.
     last: Option<(f64, Vec3)>,
+    /// After a lost one.
+    blind: Option<Blind>,
     /// What is being exerted.
     wrench: Wrench,
     forces: Forces,
+}
+
+/// Ticks without a sample.
+#[derive(Clone, Copy, Debug)]
+struct Blind {
+    /// Where the tool was before them.
+    place: Vec3,
+    /// How many there were.
+    ticks: u32,
+    /// The sum of the forces that were held before each, in newtons.
+    forces: Vec3,
 }
 
 impl ForceLaw {
@@ -83,6 +96,7 @@ impl ForceLaw {
             watchdog: Watchdog::new(settings.timeout, settings.fade),
             passivity: Passivity::new(settings.max_damping, device.resolution),
             last: None,
+            blind: None,
             wrench: Wrench::default(),
             forces: Forces::default(),
         }
@@ -102,6 +116,10 @@ impl ForceLaw {
         let (way, elapsed) =
             self.last.map_or((Vec3::ZERO, 0.0), |(then, place)| (position - place, time - then));
         self.passivity.observe(self.wrench.force, way);
+        if let Some(Blind { place, ticks, forces }) = self.blind.take() {
+            let mean = (forces + self.wrench.force) / (ticks + 1) as f32;
+            self.passivity.observe(mean, position - place);
+        }
         let is_new = number != self.number;
         if is_new || self.last.is_none() {
             self.enter(time, position, model, is_new);
@@ -127,7 +145,13 @@ impl ForceLaw {
 
     /// A tick without a sample: the force goes towards zero, and what comes after begins anew.
     pub fn step_blind(&mut self) -> Wrench {
-        self.last = None;
+        if let Some((_, place)) = self.last.take() {
+            self.blind = Some(Blind { place, ticks: 0, forces: Vec3::ZERO });
+        }
+        if let Some(blind) = &mut self.blind {
+            blind.ticks = blind.ticks.saturating_add(1);
+            blind.forces += self.wrench.force;
+        }
         self.exert(Wrench::default());
         self.wrench
     }
@@ -233,6 +257,20 @@ mod tests {
         let back = rest(&mut law, 420, 820);
         assert!(back[0] < 0.1 && smooth(&back), "{back:?}");
         assert!((back[399] - 2.0).abs() < 1e-3, "{}", back[399]);
+    }
+
+    /// A tool that is pushed out unseen has taken work with it: the mean force times the way.
+    #[test]
+    fn blind_ticks_are_no_gift() {
+        let mut law = law();
+        rest(&mut law, 1, 400);
+        let before = law.forces().absorbed;
+        let blind: f32 = 2.0 + (0..4).map(|_| law.step_blind().force.y).sum::<f32>();
+        let out = DeviceSample::at(Vec3::Y * 3e-3);
+        law.step(0.5, &out, (400, &WALL));
+        let given = before - law.forces().absorbed;
+        let expected = f64::from(blind) / 5.0 * 5e-3;
+        assert!((given - expected).abs() < 1e-6 && given > 4e-3, "{given} J, not {expected} J");
     }
 
     /// A tool that breaks in fast and goes out slowly: the force that could not rise in time must not

@@ -10,7 +10,8 @@
 //! - The observer counts the work E that the hand has put in: a force F, held over a tick in which the
 //!   tool moves by Δx, takes −F·Δx from it, and that is exact (J.-H. Ryu, Y. S. Kim, B. Hannaford,
 //!   "Sampled- and continuous-time passivity and stability of virtual environments", IEEE Trans.
-//!   Robotics 20(4), 2004).
+//!   Robotics 20(4), 2004). Only where samples are lost is it not: the tool is taken to have moved evenly
+//!   meanwhile, against the mean of the forces.
 //! - The reference is the energy V that the local model stores where the tool is. Where E falls short of
 //!   V, the difference was generated, and the controller takes it back by damping: α = (V − E)·T/Δx², at
 //!   most a stated one. For a wall of stiffness K that comes to α = K·T/2, just what holding a force
@@ -49,7 +50,7 @@ impl Passivity {
         Self { max_damping, resolution, damping: 0.0, energy: 0.0, absorbed: 0.0, least: 0.0 }
     }
 
-    /// Counts the work of a tick in which `force` was held while the tool moved by `way`.
+    /// Counts the work of a tick, or of several, in which `force` was held while the tool moved by `way`.
     pub(super) fn observe(&mut self, force: Vec3, way: Vec3) {
         let work = -force.as_dvec3().dot(way.as_dvec3());
         self.energy += work;
