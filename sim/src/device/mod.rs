@@ -40,8 +40,6 @@ pub mod watchdog;
 use glam::{Quat, Vec3};
 use thiserror::Error;
 
-use crate::geometry::Bounds;
-
 /// What a device says at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeviceSample {
@@ -83,8 +81,6 @@ pub struct DeviceDescription {
     pub name: &'static str,
     /// The least and the greatest rate it may be driven at, in hertz; usually up to 1,000 or 4,000.
     pub rates: [f64; 2],
-    /// The space that its tip can reach, in metres; usually 0.1 to 0.2 across.
-    pub workspace: Bounds,
     /// The steps in which it tells positions, in metres; usually 10⁻⁵ to 6·10⁻⁵; 0 for none.
     pub resolution: f32,
     /// The greatest force, in newtons; usually 3.3 to 12; 0 for a device without forces.
@@ -96,13 +92,12 @@ pub struct DeviceDescription {
 }
 
 impl DeviceDescription {
-    /// A device that is only read: no forces, any rate up to 4 kHz, everywhere.
+    /// A device that is only read: no forces, any rate up to 4 kHz.
     #[must_use]
     pub fn without_forces(name: &'static str) -> Self {
-        let workspace = Bounds::ALL;
         let (max_force, max_torque, max_stiffness) = (0.0, 0.0, 0.0);
         let rates = [1.0, 4_000.0];
-        Self { name, rates, workspace, resolution: 0.0, max_force, max_torque, max_stiffness }
+        Self { name, rates, resolution: 0.0, max_force, max_torque, max_stiffness }
     }
 }
 

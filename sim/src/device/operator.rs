@@ -4,7 +4,6 @@ use glam::{DVec3, Vec3};
 
 use super::motion::Motion;
 use super::{DeviceDescription, DeviceError, DeviceSample, HapticDevice, Wrench};
-use crate::geometry::Bounds;
 
 /// The longest step in which the motion is integrated, in seconds. Usually 20 µs: the stiffest hand on
 /// the lightest device swings at some 300 rad/s, so a step is below a hundredth of a radian.
@@ -67,7 +66,6 @@ impl SimulatedDevice {
     pub const DESCRIPTION: DeviceDescription = DeviceDescription {
         name: "simulated device",
         rates: [500.0, 4_000.0],
-        workspace: Bounds { min: Vec3::splat(-0.08), max: Vec3::splat(0.08) },
         resolution: 1e-5,
         max_force: 12.0,
         max_torque: 0.0,
