@@ -34,12 +34,15 @@ impl Volume {
     #[must_use]
     pub fn cast(&self, origin: Vec3, direction: Vec3, reach: f32) -> Option<f32> {
         let step = self.spacing().min_element();
-        let steps = (reach / step).ceil() as u32;
-        let mut before = self.density_at(origin);
+        // Bone ends half a voxel beyond the grid; farther on there is nothing to look for.
+        let bounds = self.bounds().inflated(self.spacing().max_element());
+        let [begin, end] = crossed(&bounds, origin, direction, reach)?;
+        let [first, last] = [(begin / step) as u32, (end / step).ceil() as u32];
+        let mut before = self.density_at(origin + direction * (first as f32 * step));
         if before >= 0.5 {
-            return Some(0.0);
+            return Some(first as f32 * step);
         }
-        for way in (1..=steps).map(|number| number as f32 * step) {
+        for way in (first..last).map(|number| (number + 1) as f32 * step) {
             let density = self.density_at(origin + direction * way);
             if density >= 0.5 {
                 return Some(way - step * (density - 0.5) / (density - before));
@@ -115,6 +118,20 @@ mod tests {
                 let aside = direction.any_orthonormal_vector() * 0.021;
                 assert_eq!(ball.cast(origin + aside, direction, 1.0), None);
             }
+        }
+    }
+
+    #[test]
+    fn a_ray_into_bone_may_have_no_end() {
+        let [_, _, bone] = balls();
+        let volume = bone.as_volume().expect("bone");
+        for direction in [Vec3::X, Vec3::NEG_Y, Vec3::new(0.6, 0.0, -0.8)] {
+            let origin = CENTER - direction * 0.5;
+            let near = volume.cast(origin, direction, 0.5);
+            assert_eq!(volume.cast(origin, direction, f32::INFINITY), near);
+            assert!((near.expect("it points at the middle") - 0.48).abs() < 1e-3, "{near:?}");
+            assert_eq!(volume.cast(origin, -direction, f32::INFINITY), None);
+            assert_eq!(volume.cast(CENTER - direction * 1e30, direction, f32::INFINITY), None);
         }
     }
 
