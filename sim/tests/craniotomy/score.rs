@@ -200,3 +200,23 @@ fn a_burr_hole_aslant() {
     assert!(hole.error < 5e-4, "{hole:?}");
     assert!((hole.angle.to_degrees() - 10.0).abs() < 0.1, "{hole:?}");
 }
+
+/// Seconds are seconds also while both hands drill.
+#[test]
+fn two_drills_in_the_air() {
+    let mut theatre = Theatre::new(Step::Incision, ExecutorKind::Serial, 1);
+    let mut operation = Operation::new(head(), None);
+    let mailbox = theatre.manager.mailbox();
+    for (tool, side) in TOOLS.into_iter().zip([0.1, -0.1]) {
+        mailbox.post(tool, Message::TakeUp(Instrument::Burr));
+        let sample = DeviceSample::at(Vec3::new(side, 0.3, 0.0));
+        mailbox.post(tool, Message::Device(DeviceSample { buttons: 1, ..sample }));
+    }
+    let mut renderer = NullRenderer::new();
+    let (_, mut watch) = operation.parts(&mut renderer);
+    theatre.manager.run(30, &mut watch, &mut |_| ()).expect("no table is full");
+    let report = operation.report(|see| theatre.manager.visit(see));
+    let Report { seconds, drilling_seconds, air_seconds, .. } = report;
+    assert!(drilling_seconds > 0.8 * seconds && drilling_seconds <= seconds, "{report:?}");
+    assert_eq!(air_seconds, drilling_seconds);
+}

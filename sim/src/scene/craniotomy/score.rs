@@ -22,7 +22,9 @@ pub struct Score {
     frames: u64,
     drilling: u64,
     in_air: u64,
-    /// Frames by the force of bone on a turning bit.
+    /// Whether a bit turned in the frame that is not over yet, and whether one touched no bone.
+    now: [bool; 2],
+    /// Frames of each tool by the force of bone on its turning bit.
     forces: Vec<u32>,
     peak: f32,
     tissue_peak: f32,
@@ -41,7 +43,8 @@ pub struct Score {
 /// How a burr hole was drilled, beside the plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// How far from the planned entry the bit's axis goes through the outer table, in metres.
+    /// How far from the planned entry the bit's axis goes through the outer table, in metres; where it runs along
+    /// that, how far the tip is.
     pub error: f32,
     /// The angle between that axis and the planned direction, in radians.
     pub angle: f32,
@@ -52,9 +55,9 @@ pub struct Placement {
 pub struct Report {
     /// Of the operation, in seconds.
     pub seconds: f64,
-    /// In which a bit turned, in seconds.
+    /// In which a bit turned, in seconds; of both hands at once only once.
     pub drilling_seconds: f64,
-    /// In which it turned and touched no bone, in seconds.
+    /// In which one turned and touched no bone, in seconds.
     pub air_seconds: f64,
     /// The greatest force of bone on a turning bit, in newtons.
     pub peak_force: f32,
@@ -89,6 +92,7 @@ impl Score {
             frames: 0,
             drilling: 0,
             in_air: 0,
+            now: [false; 2],
             forces: vec![0; FORCE_STEPS],
             peak: 0.0,
             tissue_peak: 0.0,
@@ -105,6 +109,9 @@ impl Score {
     /// A frame is over.
     pub fn frame(&mut self) {
         self.frames += 1;
+        let [turned, in_air] = std::mem::take(&mut self.now).map(u64::from);
+        self.drilling += turned;
+        self.in_air += in_air;
     }
 
     /// Notes what tool number `hand` (0 or 1) did in this frame. `past_inner_table` says how far a place is
@@ -125,8 +132,8 @@ impl Score {
             self.hole = Some((tip, rigid.pose.rotation * Vec3::Z));
         }
         self.perforates[hand] = perforates;
-        self.drilling += 1;
-        self.in_air += u64::from(force == 0.0);
+        let [_, in_air] = self.now;
+        self.now = [true, in_air | (force == 0.0)];
         // As an integer, what is not a number becomes 0.
         let step = (force / FORCE_STEP) as usize;
         self.forces[step.min(FORCE_STEPS - 1)] += 1;
@@ -166,13 +173,14 @@ impl Score {
 
     /// The force that this share of the drilling stayed below.
     fn percentile(&self, share: f64) -> f32 {
-        let all = (self.drilling as f64 * share).ceil() as u64;
+        let drilling: u64 = self.forces.iter().copied().map(u64::from).sum();
+        let all = (drilling as f64 * share).ceil() as u64;
         let mut below = 0;
         let step = self.forces.iter().position(|&frames| {
             below += u64::from(frames);
             below >= all
         });
-        if self.drilling == 0 { 0.0 } else { (step.unwrap_or(0) + 1) as f32 * FORCE_STEP }
+        if drilling == 0 { 0.0 } else { (step.unwrap_or(0) + 1) as f32 * FORCE_STEP }
     }
 }
 
@@ -180,6 +188,24 @@ impl Score {
 fn placement((tip, axis): (Vec3, Vec3), planned: &Entry) -> Placement {
     let Entry { point, inward, .. } = *planned;
     // Along the axis to the plane that touches the outer table at the planned entry.
-    let entry = tip - axis * ((tip - point).dot(inward) / axis.dot(inward));
+    let way = (tip - point).dot(inward) / axis.dot(inward);
+    let entry = if way.is_finite() { tip - axis * way } else { tip };
     Placement { error: entry.distance(point), angle: axis.angle_between(-inward) }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f32::consts::FRAC_PI_2;
+
+    use super::*;
+
+    #[test]
+    fn a_hole_along_the_outer_table() {
+        let planned = Entry { point: Vec3::ZERO, inward: Vec3::NEG_Y, thickness: 0.005 };
+        for (tip, error) in [(Vec3::Z * 0.003, 0.003), (Vec3::new(0.0, 0.003, 0.004), 0.005)] {
+            let placement = placement((tip, Vec3::X), &planned);
+            assert!((placement.error - error).abs() < 1e-6, "{placement:?}");
+            assert!((placement.angle - FRAC_PI_2).abs() < 1e-6, "{placement:?}");
+        }
+    }
 }
