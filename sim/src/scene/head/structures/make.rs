@@ -102,8 +102,7 @@ impl Tissue {
         surface: Surface,
         hold: impl Fn(u32, Vec3, bool) -> Option<Hold>,
     ) -> Structure {
-        let areas = surface.node_areas();
-        let area = areas.iter().sum::<f32>().max(f32::MIN_POSITIVE);
+        let area = surface.node_areas().iter().sum::<f32>().max(f32::MIN_POSITIVE);
         let (area_density, stiffness) = match self.form {
             Form::Sheet => (self.density * self.thickness, LATTICE * self.modulus * self.thickness),
             Form::Solid => {
@@ -113,7 +112,6 @@ impl Tissue {
                 (self.density * surface.volume() / area, LATTICE * self.modulus * self.thickness)
             }
         };
-        let masses = areas.iter().map(|area| area_density * area).collect();
         let nodes = (0..).zip(surface.positions.iter().zip(surface.on_border()));
         let pins = nodes.filter_map(|(node, (&position, border))| {
             hold(node, position, border).map(|hold| (node, hold))
@@ -124,7 +122,6 @@ impl Tissue {
             layer: self.layer,
             form: self.form,
             pins: pins.collect(),
-            masses,
             stiffness,
             area_density,
             contact_radius: self.contact_radius,

@@ -75,8 +75,6 @@ pub struct Structure {
     /// Its triangles, counter-clockwise as seen from outside: from the side of the skin for what lies
     /// around the brain, from the right for the falx, from above for the tentorium.
     pub triangles: Vec<[u32; 3]>,
-    /// The nodes' masses, in kilograms.
-    pub masses: Vec<f32>,
     /// Where it is held, in ascending order of nodes.
     pub pins: Vec<(u32, Hold)>,
     /// The stiffness of a spring along an edge, in newtons per metre: (√3/2)·E·t of a sheet or a vessel's
