@@ -1,8 +1,9 @@
 //! Volumes out.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
+use std::process;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -42,24 +43,51 @@ voxel!(u16, 512);
 
 /// Writes a volume to a file, packed by gzip if its name ends in `.gz`; as [`write()`].
 ///
+/// It is written beside the file and takes its place when it is whole, so that a full disk leaves what was there. A
+/// device or a pipe is written as it is.
+///
 /// # Errors
-/// As [`write()`], or the file cannot be created.
+/// As [`write()`], or the file, or one beside it, cannot be created.
 pub fn save<V: Voxel>(path: &Path, grid: &Grid, voxels: &[V]) -> Result<(), FileError> {
+    let packs = path.extension().is_some_and(|extension| extension == "gz");
     let save = || {
         grid.check_length(voxels.len())?;
-        let file = BufWriter::new(File::create(path)?);
-        if path.extension().is_some_and(|extension| extension == "gz") {
-            let mut packed = GzEncoder::new(file, Compression::fast());
-            write(&mut packed, grid, voxels)?;
-            packed.finish()?.flush()?;
-        } else {
-            let mut file = file;
-            write(&mut file, grid, voxels)?;
-            file.flush()?;
+        let there = fs::metadata(path);
+        if there.as_ref().is_ok_and(|there| !there.is_file()) {
+            return fill(&File::create(path)?, packs, grid, voxels);
         }
-        Ok(())
+        // A link stays one.
+        let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let mut beside = place.clone().into_os_string();
+        beside.push(format!(".{}.part", process::id()));
+        let file = File::create_new(&beside)?;
+        let written = (|| {
+            if let Ok(there) = there {
+                file.set_permissions(there.permissions())?;
+            }
+            fill(&file, packs, grid, voxels)?;
+            file.sync_all()?;
+            Ok(fs::rename(&beside, &place)?)
+        })();
+        if written.is_err() {
+            // What the disk had no room for; why is told already.
+            let _ = fs::remove_file(&beside);
+        }
+        written
     };
     save().map_err(|source| FileError { path: path.to_owned(), source })
+}
+
+fn fill<V: Voxel>(file: &File, packs: bool, grid: &Grid, voxels: &[V]) -> Result<(), ImageError> {
+    let mut file = BufWriter::new(file);
+    if packs {
+        let mut packed = GzEncoder::new(&mut file, Compression::fast());
+        write(&mut packed, grid, voxels)?;
+        packed.finish()?;
+    } else {
+        write(&mut file, grid, voxels)?;
+    }
+    Ok(file.flush()?)
 }
 
 /// Writes a volume as NIfTI-1, low bytes first and lengths in millimetres: `voxels` are the image's, x
