@@ -56,6 +56,7 @@ fn simulated_hands_operate() {
         told(&run(&[&["craniotomy", "--simulated-devices"], args].concat()), 2, expected);
     };
     refused(&["--window"], "--window");
+    refused(&["--haptic-rate", "99"], "100 to 4000");
     refused(&["--haptic-rate", "100"], "500 to 4000 Hz");
 }
 

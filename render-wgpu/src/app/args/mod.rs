@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dualframe_sim::blocking::{Blocking, Grain};
-use dualframe_sim::device::thread::{MAX_RATE, RATE};
+use dualframe_sim::device::thread::{MAX_RATE, MIN_RATE, RATE};
 use dualframe_sim::executor::{Entry, ExecutorKind, MAX_THREADS};
 use dualframe_sim::experiment::Experiment;
 use dualframe_sim::experiment::plan::Plan;
@@ -268,7 +268,7 @@ pub(in crate::app) struct CraniotomyArgs {
     #[arg(long, conflicts_with = "window")]
     pub(in crate::app) simulated_devices: bool,
     #[arg(long, value_name = "HZ", default_value_t = RATE, value_parser = parse_rate,
-          help = format!("How often a second the hands' haptic loops tick, 1 to {MAX_RATE}; simulated \
+          help = format!("How often a second the hands' haptic loops tick, {MIN_RATE} to {MAX_RATE}; simulated \
                           devices take 500 and more"))]
     pub(in crate::app) haptic_rate: f64,
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_FRAMES),

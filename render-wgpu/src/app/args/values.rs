@@ -1,6 +1,6 @@
 //! What single arguments may be.
 
-use dualframe_sim::device::thread::MAX_RATE;
+use dualframe_sim::device::thread::{MAX_RATE, MIN_RATE};
 use dualframe_sim::executor::{ExecutorKind, MAX_THREADS};
 use dualframe_sim::scene::ParticleScene;
 use dualframe_sim::scene::craniotomy::Step;
@@ -12,8 +12,8 @@ const MAX_PIXELS: u32 = 16_384;
 const NATIVE_PEERS: [&str; 4] = ["openmp-static", "openmp-dynamic", "tbb-for", "tbb-pipeline"];
 
 pub(super) fn parse_rate(text: &str) -> Result<f64, String> {
-    let rate = text.parse().ok().filter(|rate| (1.0..=MAX_RATE).contains(rate));
-    rate.ok_or_else(|| format!("not a number from 1 to {MAX_RATE}"))
+    let rate = text.parse().ok().filter(|rate| (MIN_RATE..=MAX_RATE).contains(rate));
+    rate.ok_or_else(|| format!("not a number from {MIN_RATE} to {MAX_RATE}"))
 }
 
 pub(super) fn parse_step(text: &str) -> Result<Step, String> {
