@@ -84,22 +84,54 @@ pub(in super::super) struct Node<C> {
     pub(super) position: [C; 3],
     /// In metres per second.
     pub(super) velocity: [C; 3],
+}
+
+/// What one node of each body weighs.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in super::super) struct Weight<C> {
     /// In kilograms.
     pub(super) mass: C,
     /// In 1/kg.
-    pub(super) inverse_mass: C,
+    pub(super) inverse: C,
 }
 
-impl<C> Node<C> {
+/// Some numbers of one node of each body, a row each.
+pub(super) trait Rows<C> {
+    const COUNT: usize;
+    /// A row of the node.
+    fn row(&mut self, index: usize) -> &mut C;
+    /// What all nodes of one body have in that row.
+    fn of<'b>(body: &'b KernelParts<'_>, index: usize) -> &'b [Lanes];
+}
+
+impl<C> Rows<C> for Node<C> {
+    const COUNT: usize = 6;
+
     #[inline(always)]
-    fn rows(&mut self) -> [&mut C; ROWS] {
-        let ([x, y, z], [vx, vy, vz]) = (&mut self.position, &mut self.velocity);
-        [x, y, z, vx, vy, vz, &mut self.mass, &mut self.inverse_mass]
+    fn row(&mut self, index: usize) -> &mut C {
+        if index < 3 { &mut self.position[index] } else { &mut self.velocity[index - 3] }
+    }
+
+    #[inline(always)]
+    fn of<'b>(body: &'b KernelParts<'_>, index: usize) -> &'b [Lanes] {
+        let KernelParts { positions, velocities, .. } = body;
+        if index < 3 { &positions.components[index] } else { &velocities.components[index - 3] }
     }
 }
 
-/// The numbers of a node.
-const ROWS: usize = 8;
+impl<C> Rows<C> for Weight<C> {
+    const COUNT: usize = 2;
+
+    #[inline(always)]
+    fn row(&mut self, index: usize) -> &mut C {
+        if index == 0 { &mut self.mass } else { &mut self.inverse }
+    }
+
+    #[inline(always)]
+    fn of<'b>(body: &'b KernelParts<'_>, index: usize) -> &'b [Lanes] {
+        if index == 0 { body.masses } else { body.inverse_masses }
+    }
+}
 
 /// The force on one node of each body, in newtons.
 #[derive(Clone, Copy, Debug, Default)]
@@ -110,6 +142,8 @@ pub(in super::super) struct Force<C: Columns>(pub(super) [C; 3], pub(super) C::A
 pub(in super::super) struct Set<C: Columns> {
     /// The bodies under way, and those which wait for a lane or are done; in whole [`LANES`] of nodes.
     pub(super) nodes: [Vec<Node<C>>; 2],
+    /// Of the same bodies.
+    pub(super) weights: [Vec<Weight<C>>; 2],
     pub(super) forces: Vec<Force<C>>,
 }
 
@@ -117,29 +151,33 @@ impl<C: Columns> Set<C> {
     /// Makes room for bodies of so many nodes.
     pub(super) fn reserve(&mut self, nodes: usize) {
         let room = nodes.next_multiple_of(LANES);
-        for set in &mut self.nodes {
-            set.resize(set.len().max(room), Node::default());
+        for nodes in &mut self.nodes {
+            nodes.resize(nodes.len().max(room), Node::default());
+        }
+        for weights in &mut self.weights {
+            weights.resize(weights.len().max(room), Weight::default());
         }
         self.forces.resize(self.forces.len().max(room), Force::default());
     }
 }
 
-/// The nodes of all bodies and the forces on them.
-pub(super) type Motion<'n, C> = (&'n mut [Node<C>], &'n mut [Force<C>]);
+/// The nodes of all bodies, what they weigh and the forces on them.
+pub(super) type Motion<'n, C> = (&'n mut [Node<C>], &'n [Weight<C>], &'n mut [Force<C>]);
 
 /// A body with its numbers.
 pub(in super::super) type Body<'a> = (KernelParts<'a>, Springs);
 
 /// Exchanges the bodies of the lanes in which all bits are set.
 #[inline(always)]
-pub(super) fn exchange<A: Arithmetic>(
+pub(super) fn exchange<A: Arithmetic, R: Rows<A::Lanes>>(
     isa: A,
-    a: &mut [Node<A::Lanes>],
-    b: &mut [Node<A::Lanes>],
+    a: &mut [R],
+    b: &mut [R],
     lanes: A::Vector,
 ) {
     for (a, b) in a.iter_mut().zip(b) {
-        for (a, b) in a.rows().into_iter().zip(b.rows()) {
+        for row in 0..R::COUNT {
+            let (a, b) = (a.row(row), b.row(row));
             let (old_a, old_b) = (isa.load(a), isa.load(b));
             isa.store(isa.choose(lanes, old_b, old_a), a);
             isa.store(isa.choose(lanes, old_a, old_b), b);
@@ -149,35 +187,44 @@ pub(super) fn exchange<A: Arithmetic>(
 
 /// Brings the bodies side by side.
 #[inline(always)]
-pub(super) fn gather<H: HalfIsa, C: Columns>(
+pub(super) fn gather<H: HalfIsa, C: Columns, R: Rows<C>>(
     isa: H,
     bodies: &[Option<Body<'_>>],
-    nodes: &mut [Node<C>],
+    nodes: &mut [R],
 ) {
     let Some((any, _)) = bodies.iter().flatten().next() else { return };
     for (chunk, nodes) in nodes.as_chunks_mut::<HALF>().0.iter_mut().enumerate() {
-        for row in 0..ROWS {
+        for row in 0..R::COUNT {
             for half in 0..C::COUNT / HALF {
                 let mut rows = [isa.splat(0.0); HALF];
                 for lane in 0..HALF {
                     // Lanes without a body repeat one.
                     let body = &bodies[half * HALF + lane];
-                    let KernelParts { positions, velocities, masses, inverse_masses, .. } =
-                        if let Some((body, _)) = body { body } else { any };
-                    let values = match row {
-                        0..3 => &positions.components[row],
-                        3..6 => &velocities.components[row - 3],
-                        6 => *masses,
-                        _ => *inverse_masses,
-                    };
+                    let values = R::of(if let Some((body, _)) = body { body } else { any }, row);
                     rows[lane] = isa.load(&values[chunk / 2].as_chunks().0[chunk % 2]);
                 }
                 let columns = isa.transpose(rows);
                 for lane in 0..HALF {
-                    isa.store(columns[lane], &mut nodes[lane].rows()[row].halves_mut()[half]);
+                    isa.store(columns[lane], &mut nodes[lane].row(row).halves_mut()[half]);
                 }
             }
         }
+    }
+}
+
+/// What bodies weigh that share their masses.
+#[inline(always)]
+pub(super) fn weigh<A: Arithmetic>(
+    isa: A,
+    body: &KernelParts<'_>,
+    weights: &mut [Weight<A::Lanes>],
+) {
+    let masses = body.masses.as_flattened().iter().zip(body.inverse_masses.as_flattened());
+    for (Weight { mass: to, inverse: to_inverse }, (&mass, &inverse)) in
+        weights.iter_mut().zip(masses)
+    {
+        isa.store(isa.splat(mass), to);
+        isa.store(isa.splat(inverse), to_inverse);
     }
 }
 
