@@ -4,6 +4,7 @@ use std::fmt::Debug;
 use std::slice;
 
 use super::super::spring_kernel::Springs;
+use super::WIDEST;
 use crate::geometry::{KernelParts, LANES, Lanes};
 use crate::simd::{Arithmetic, HALF, HalfIsa, HalfLanes};
 
@@ -86,6 +87,13 @@ pub(in super::super) struct Node<C> {
     pub(super) velocity: [C; 3],
 }
 
+impl<C> Node<C> {
+    #[inline(always)]
+    fn row(&self, index: usize) -> &C {
+        if index < 3 { &self.position[index] } else { &self.velocity[index - 3] }
+    }
+}
+
 /// What one node of each body weighs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in super::super) struct Weight<C> {
@@ -99,7 +107,7 @@ pub(in super::super) struct Weight<C> {
 pub(super) trait Rows<C> {
     const COUNT: usize;
     /// A row of the node.
-    fn row(&mut self, index: usize) -> &mut C;
+    fn row_mut(&mut self, index: usize) -> &mut C;
     /// What all nodes of one body have in that row.
     fn of<'b>(body: &'b KernelParts<'_>, index: usize) -> &'b [Lanes];
 }
@@ -108,7 +116,7 @@ impl<C> Rows<C> for Node<C> {
     const COUNT: usize = 6;
 
     #[inline(always)]
-    fn row(&mut self, index: usize) -> &mut C {
+    fn row_mut(&mut self, index: usize) -> &mut C {
         if index < 3 { &mut self.position[index] } else { &mut self.velocity[index - 3] }
     }
 
@@ -123,7 +131,7 @@ impl<C> Rows<C> for Weight<C> {
     const COUNT: usize = 2;
 
     #[inline(always)]
-    fn row(&mut self, index: usize) -> &mut C {
+    fn row_mut(&mut self, index: usize) -> &mut C {
         if index == 0 { &mut self.mass } else { &mut self.inverse }
     }
 
@@ -177,7 +185,7 @@ pub(super) fn exchange<A: Arithmetic, R: Rows<A::Lanes>>(
 ) {
     for (a, b) in a.iter_mut().zip(b) {
         for row in 0..R::COUNT {
-            let (a, b) = (a.row(row), b.row(row));
+            let (a, b) = (a.row_mut(row), b.row_mut(row));
             let (old_a, old_b) = (isa.load(a), isa.load(b));
             isa.store(isa.choose(lanes, old_b, old_a), a);
             isa.store(isa.choose(lanes, old_a, old_b), b);
@@ -189,23 +197,29 @@ pub(super) fn exchange<A: Arithmetic, R: Rows<A::Lanes>>(
 #[inline(always)]
 pub(super) fn gather<H: HalfIsa, C: Columns, R: Rows<C>>(
     isa: H,
-    bodies: &[Option<Body<'_>>],
+    bodies: &[Option<Body<'_>>; WIDEST],
     nodes: &mut [R],
 ) {
     let Some((any, _)) = bodies.iter().flatten().next() else { return };
-    for (chunk, nodes) in nodes.as_chunks_mut::<HALF>().0.iter_mut().enumerate() {
-        for row in 0..R::COUNT {
-            for half in 0..C::COUNT / HALF {
+    let ((bodies, _), (nodes, _)) = (bodies.as_chunks::<HALF>(), nodes.as_chunks_mut::<HALF>());
+    let chunks = nodes.len();
+    for row in 0..R::COUNT {
+        for (half, bodies) in bodies[..C::COUNT / HALF].iter().enumerate() {
+            // Looked up and cut to their length here: in the loop below that took as long as the rest.
+            let values = bodies.each_ref().map(|body| {
+                // Lanes without a body repeat one.
+                let body = body.as_ref().map_or(any, |(body, _)| body);
+                let (values, _) = R::of(body, row).as_flattened().as_chunks();
+                &values[..chunks]
+            });
+            for (chunk, nodes) in nodes.iter_mut().enumerate() {
                 let mut rows = [isa.splat(0.0); HALF];
                 for lane in 0..HALF {
-                    // Lanes without a body repeat one.
-                    let body = &bodies[half * HALF + lane];
-                    let values = R::of(if let Some((body, _)) = body { body } else { any }, row);
-                    rows[lane] = isa.load(&values[chunk / 2].as_chunks().0[chunk % 2]);
+                    rows[lane] = isa.load(&values[lane][chunk]);
                 }
                 let columns = isa.transpose(rows);
                 for lane in 0..HALF {
-                    isa.store(columns[lane], &mut nodes[lane].row(row).halves_mut()[half]);
+                    isa.store(columns[lane], &mut nodes[lane].row_mut(row).halves_mut()[half]);
                 }
             }
         }
@@ -233,24 +247,31 @@ pub(super) fn weigh<A: Arithmetic>(
 pub(super) fn scatter<H: HalfIsa, C: Columns>(
     isa: H,
     nodes: &[Node<C>],
-    bodies: &mut [Option<Body<'_>>],
+    bodies: &mut [Option<Body<'_>>; WIDEST],
 ) {
-    for (chunk, nodes) in nodes.as_chunks::<HALF>().0.iter().enumerate() {
-        for axis in 0..3 {
-            for half in 0..C::COUNT / HALF {
-                let mut columns = [[isa.splat(0.0); HALF]; 2];
-                for lane in 0..HALF {
-                    columns[0][lane] = isa.load(&nodes[lane].position[axis].halves()[half]);
-                    columns[1][lane] = isa.load(&nodes[lane].velocity[axis].halves()[half]);
+    let ((bodies, _), (nodes, _)) = (bodies.as_chunks_mut::<HALF>(), nodes.as_chunks::<HALF>());
+    let chunks = nodes.len();
+    for row in 0..Node::<C>::COUNT {
+        for (half, bodies) in bodies[..C::COUNT / HALF].iter_mut().enumerate() {
+            let values = bodies.each_mut().map(|body| match body {
+                Some((KernelParts { positions, velocities, .. }, _)) => {
+                    let ([x, y, z], [vx, vy, vz]) =
+                        (&mut positions.components, &mut velocities.components);
+                    let values = [x, y, z, vx, vy, vz][row].as_flattened_mut();
+                    &mut values.as_chunks_mut().0[..chunks]
                 }
-                let [positions, velocities] =
-                    [isa.transpose(columns[0]), isa.transpose(columns[1])];
+                None => &mut [],
+            });
+            for (chunk, nodes) in nodes.iter().enumerate() {
+                let mut columns = [isa.splat(0.0); HALF];
                 for lane in 0..HALF {
-                    let Some((body, _)) = &mut bodies[half * HALF + lane] else { continue };
-                    let row = &mut body.positions.components[axis][chunk / 2];
-                    isa.store(positions[lane], &mut row.as_chunks_mut().0[chunk % 2]);
-                    let row = &mut body.velocities.components[axis][chunk / 2];
-                    isa.store(velocities[lane], &mut row.as_chunks_mut().0[chunk % 2]);
+                    columns[lane] = isa.load(&nodes[lane].row(row).halves()[half]);
+                }
+                let rows = isa.transpose(columns);
+                for lane in 0..HALF {
+                    if let Some(values) = values[lane].get_mut(chunk) {
+                        isa.store(rows[lane], values);
+                    }
                 }
             }
         }
