@@ -11,7 +11,9 @@ mod nodes;
 use std::hint::black_box;
 use std::ptr;
 
-use self::nodes::{Body, Columns, Force, Motion, Node, Set, exchange, gather, scatter};
+use self::nodes::{
+    Body, Columns, Force, Motion, Node, Set, Weight, exchange, gather, scatter, weigh,
+};
 use super::spring_kernel::Springs;
 use super::spring_law::{Dashpot, Elastic, Law, load, minus, plus, store, times};
 use crate::geometry::{KernelParts, LANES, Lanes, Spring, Topology};
@@ -72,31 +74,42 @@ fn advance_all<A: Arithmetic<Lanes: Columns>, H: HalfIsa>(
     [first, second]: &mut [[Option<Body<'_>>; WIDEST]; 2],
     set: &mut Set<A::Lanes>,
 ) {
-    let Some((KernelParts { topology, masses, .. }, springs)) = &first[0] else { return };
+    let Some((any @ KernelParts { topology, .. }, springs)) = &first[0] else { return };
     let (topology, idle) = (*topology, Seat { springs: *springs, left: 0 });
     let mut bodies = first.iter().chain(&*second).flatten();
-    let alike = bodies.all(|(body, _)| ptr::eq(body.masses, *masses));
+    let alike = bodies.all(|(body, _)| ptr::eq(body.masses, any.masses));
     set.reserve(topology.nodes());
     let len = topology.present().len() * LANES;
-    let ([now, next], forces) = (&mut set.nodes, &mut set.forces);
+    let Set { nodes: [now, next], weights: [weights, next_weights], forces } = set;
     let (now, next) = (&mut now[..len], &mut next[..len]);
+    let (weights, next_weights) = (&mut weights[..len], &mut next_weights[..len]);
     let forces = &mut forces[..topology.nodes()];
-    gather(isa, half, first, now, alike);
-    gather(isa, half, second, next, alike);
-    let mut moving = begin(isa, topology, first, idle, (&mut *now, &mut *forces));
-    let mut later = begin(isa, topology, second, idle, (&mut *next, &mut *forces));
+    if alike {
+        weigh(isa, any, weights);
+    } else {
+        gather(half, first, weights);
+        gather(half, second, next_weights);
+    }
+    let mut moving = begin(isa, half, topology, first, idle, (&mut *now, weights, &mut *forces));
+    let next_weighed = if alike { &*weights } else { &*next_weights };
+    let mut later =
+        begin(isa, half, topology, second, idle, (&mut *next, next_weighed, &mut *forces));
     loop {
         let takes = |lane: usize| moving[lane].left == 0 && later[lane].left > 0;
         let takes: [bool; WIDEST] = std::array::from_fn(takes);
         if takes.contains(&true) {
-            exchange(isa, now, next, mask(isa, takes), alike);
+            let lanes = mask(isa, takes);
+            exchange(isa, now, next, lanes);
+            if !alike {
+                exchange(isa, weights, next_weights, lanes);
+            }
             for lane in (0..WIDEST).filter(|&lane| takes[lane]) {
                 moving[lane] = std::mem::replace(&mut later[lane], idle);
             }
         }
         let left = moving.iter().map(|seat| seat.left).filter(|&left| left > 0);
         let Some(substeps) = left.min() else { break };
-        advance(isa, topology, &moving, substeps, (&mut *now, &mut *forces));
+        advance(isa, topology, &moving, substeps, (&mut *now, weights, &mut *forces));
         for seat in &mut moving {
             seat.left = seat.left.saturating_sub(substeps);
         }
@@ -137,14 +150,15 @@ fn mask<A: Arithmetic<Lanes: Columns>>(isa: A, set: [bool; WIDEST]) -> A::Vector
     isa.load(black_box(&bits))
 }
 
-/// Lets the dashpots act. A lane without a body is `idle`.
+/// Brings bodies side by side and lets the dashpots act. A lane without a body is `idle`.
 #[inline(always)]
-fn begin<A: Arithmetic<Lanes: Columns>>(
+fn begin<A: Arithmetic<Lanes: Columns>, H: HalfIsa>(
     isa: A,
+    half: H,
     topology: &Topology,
     bodies: &[Option<Body<'_>>; WIDEST],
     idle: Seat,
-    (nodes, forces): Motion<'_, A::Lanes>,
+    (nodes, weights, forces): Motion<'_, A::Lanes>,
 ) -> [Seat; WIDEST] {
     let mut seats = [idle; WIDEST];
     for (seat, body) in seats.iter_mut().zip(bodies) {
@@ -152,11 +166,14 @@ fn begin<A: Arithmetic<Lanes: Columns>>(
             *seat = Seat { springs: *springs, left: springs.substeps };
         }
     }
-    if idle.springs.damping > 0.0 && bodies.iter().any(Option::is_some) {
-        let law = Dashpot { damping: numbers(isa, &seats, |springs| springs.damping) };
-        let time = numbers(isa, &seats, |springs| springs.time);
-        let step = Step { gravity: [isa.splat(0.0); 3], time, drifts: false };
-        step.advance(isa, topology, nodes, forces, [law, law], None);
+    if bodies.iter().any(Option::is_some) {
+        gather(half, bodies, nodes);
+        if idle.springs.damping > 0.0 {
+            let law = Dashpot { damping: numbers(isa, &seats, |springs| springs.damping) };
+            let time = numbers(isa, &seats, |springs| springs.time);
+            let step = Step { gravity: [isa.splat(0.0); 3], time, drifts: false };
+            step.advance(isa, topology, (nodes, weights, forces), [law, law], None);
+        }
     }
     seats
 }
@@ -168,7 +185,7 @@ fn advance<A: Arithmetic<Lanes: Columns>>(
     topology: &Topology,
     seats: &[Seat; WIDEST],
     substeps: u32,
-    (nodes, forces): Motion<'_, A::Lanes>,
+    (nodes, weights, forces): Motion<'_, A::Lanes>,
 ) {
     let stiffness = numbers(isa, seats, |springs| springs.stiffness);
     let edges = Elastic { stiffness, one: isa.splat(1.0) };
@@ -183,12 +200,12 @@ fn advance<A: Arithmetic<Lanes: Columns>>(
     let rests: [bool; WIDEST] = std::array::from_fn(|lane| seats[lane].left == 0);
     if !rests[..A::Lanes::COUNT].contains(&true) {
         for _ in 0..substeps {
-            step.advance(isa, topology, nodes, forces, laws, None);
+            step.advance(isa, topology, (&mut *nodes, weights, &mut *forces), laws, None);
         }
     } else {
         let moving = mask(isa, rests.map(|rests| !rests));
         for _ in 0..substeps {
-            step.advance(isa, topology, nodes, forces, laws, Some(moving));
+            step.advance(isa, topology, (&mut *nodes, weights, &mut *forces), laws, Some(moving));
         }
     }
 }
@@ -212,17 +229,20 @@ impl<V: Copy> Step<V> {
         self,
         isa: A,
         topology: &Topology,
-        nodes: &mut [Node<A::Lanes>],
-        forces: &mut [Force<A::Lanes>],
+        (nodes, weights, forces): Motion<'_, A::Lanes>,
         [edges, to_center]: [L; 2],
         moving: Option<V>,
     ) {
         let shared = pull_to_center(isa, topology, nodes, forces, to_center);
         edge_forces(isa, topology, nodes, forces, edges);
-        for (node, Force(force, _)) in nodes.iter_mut().zip(forces) {
+        for ((node, Weight { mass, inverse }), Force(force, _)) in
+            nodes.iter_mut().zip(weights).zip(forces)
+        {
+            // A compiler that vectorizes this over the nodes is slow.
+            black_box(());
             let force = plus(isa, load(isa, force), shared);
-            let weight = times(isa, self.gravity, isa.load(&node.mass));
-            let factor = isa.mul(isa.load(&node.inverse_mass), self.time);
+            let weight = times(isa, self.gravity, isa.load(mass));
+            let factor = isa.mul(isa.load(inverse), self.time);
             let before = load(isa, &node.velocity);
             let velocity = plus(isa, before, times(isa, plus(isa, force, weight), factor));
             store(isa, choose(isa, moving, velocity, before), &mut node.velocity);

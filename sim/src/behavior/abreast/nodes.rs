@@ -85,44 +85,60 @@ pub(in super::super) struct Node<C> {
     pub(super) position: [C; 3],
     /// In metres per second.
     pub(super) velocity: [C; 3],
-    /// In kilograms.
-    pub(super) mass: C,
-    /// In 1/kg.
-    pub(super) inverse_mass: C,
 }
-
-/// The numbers of a node, those that change first.
-const ROWS: usize = 8;
-/// Those that change: its position and velocity.
-const CHANGING: usize = 6;
 
 impl<C> Node<C> {
     #[inline(always)]
-    fn row(&self, row: usize) -> &C {
-        let ([x, y, z], [vx, vy, vz]) = (&self.position, &self.velocity);
-        [x, y, z, vx, vy, vz, &self.mass, &self.inverse_mass][row]
+    fn row(&self, index: usize) -> &C {
+        if index < 3 { &self.position[index] } else { &self.velocity[index - 3] }
+    }
+}
+
+/// What one node of each body weighs.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in super::super) struct Weight<C> {
+    /// In kilograms.
+    pub(super) mass: C,
+    /// In 1/kg.
+    pub(super) inverse: C,
+}
+
+/// Some numbers of one node of each body, a row each.
+pub(super) trait Rows<C> {
+    const COUNT: usize;
+    /// A row of the node.
+    fn row_mut(&mut self, index: usize) -> &mut C;
+    /// What all nodes of one body have in that row.
+    fn of<'b>(body: &'b KernelParts<'_>, index: usize) -> &'b [Lanes];
+}
+
+impl<C> Rows<C> for Node<C> {
+    const COUNT: usize = 6;
+
+    #[inline(always)]
+    fn row_mut(&mut self, index: usize) -> &mut C {
+        if index < 3 { &mut self.position[index] } else { &mut self.velocity[index - 3] }
     }
 
     #[inline(always)]
-    fn row_mut(&mut self, row: usize) -> &mut C {
-        let ([x, y, z], [vx, vy, vz]) = (&mut self.position, &mut self.velocity);
-        [x, y, z, vx, vy, vz, &mut self.mass, &mut self.inverse_mass][row]
+    fn of<'b>(body: &'b KernelParts<'_>, index: usize) -> &'b [Lanes] {
+        let KernelParts { positions, velocities, .. } = body;
+        if index < 3 { &positions.components[index] } else { &velocities.components[index - 3] }
     }
 }
 
-/// What all nodes of one body have in a row.
-#[inline(always)]
-fn numbers<'b>(body: &'b KernelParts<'_>, row: usize) -> &'b [Lanes] {
-    let ([x, y, z], [vx, vy, vz]) = (&body.positions.components, &body.velocities.components);
-    [x, y, z, vx, vy, vz, body.masses, body.inverse_masses][row]
-}
+impl<C> Rows<C> for Weight<C> {
+    const COUNT: usize = 2;
 
-/// Those of the rows that change.
-#[inline(always)]
-fn numbers_mut<'b>(body: &'b mut KernelParts<'_>, row: usize) -> &'b mut [Lanes] {
-    let ([x, y, z], [vx, vy, vz]) =
-        (&mut body.positions.components, &mut body.velocities.components);
-    [x, y, z, vx, vy, vz][row]
+    #[inline(always)]
+    fn row_mut(&mut self, index: usize) -> &mut C {
+        if index == 0 { &mut self.mass } else { &mut self.inverse }
+    }
+
+    #[inline(always)]
+    fn of<'b>(body: &'b KernelParts<'_>, index: usize) -> &'b [Lanes] {
+        if index == 0 { body.masses } else { body.inverse_masses }
+    }
 }
 
 /// The force on one node of each body, in newtons.
@@ -134,6 +150,8 @@ pub(in super::super) struct Force<C: Columns>(pub(super) [C; 3], pub(super) C::A
 pub(in super::super) struct Set<C: Columns> {
     /// The bodies under way, and those which wait for a lane or are done; in whole [`LANES`] of nodes.
     pub(super) nodes: [Vec<Node<C>>; 2],
+    /// Of the same bodies.
+    pub(super) weights: [Vec<Weight<C>>; 2],
     pub(super) forces: Vec<Force<C>>,
 }
 
@@ -141,33 +159,32 @@ impl<C: Columns> Set<C> {
     /// Makes room for bodies of so many nodes.
     pub(super) fn reserve(&mut self, nodes: usize) {
         let room = nodes.next_multiple_of(LANES);
-        for set in &mut self.nodes {
-            set.resize(set.len().max(room), Node::default());
+        for nodes in &mut self.nodes {
+            nodes.resize(nodes.len().max(room), Node::default());
+        }
+        for weights in &mut self.weights {
+            weights.resize(weights.len().max(room), Weight::default());
         }
         self.forces.resize(self.forces.len().max(room), Force::default());
     }
 }
 
-/// The nodes of all bodies and the forces on them.
-pub(super) type Motion<'n, C> = (&'n mut [Node<C>], &'n mut [Force<C>]);
+/// The nodes of all bodies, what they weigh and the forces on them.
+pub(super) type Motion<'n, C> = (&'n mut [Node<C>], &'n [Weight<C>], &'n mut [Force<C>]);
 
 /// A body with its numbers.
 pub(in super::super) type Body<'a> = (KernelParts<'a>, Springs);
 
-/// Exchanges the bodies of the lanes in which all bits are set; those that are `alike` have their masses in common.
+/// Exchanges the bodies of the lanes in which all bits are set.
 #[inline(always)]
-pub(super) fn exchange<A: Arithmetic>(
+pub(super) fn exchange<A: Arithmetic, R: Rows<A::Lanes>>(
     isa: A,
-    a: &mut [Node<A::Lanes>],
-    b: &mut [Node<A::Lanes>],
+    a: &mut [R],
+    b: &mut [R],
     lanes: A::Vector,
-    alike: bool,
 ) {
     for (a, b) in a.iter_mut().zip(b) {
-        for row in 0..ROWS {
-            if alike && row == CHANGING {
-                break;
-            }
+        for row in 0..R::COUNT {
             let (a, b) = (a.row_mut(row), b.row_mut(row));
             let (old_a, old_b) = (isa.load(a), isa.load(b));
             isa.store(isa.choose(lanes, old_b, old_a), a);
@@ -176,49 +193,52 @@ pub(super) fn exchange<A: Arithmetic>(
     }
 }
 
-/// Brings the bodies side by side; if they are `alike`, their masses are those of one.
+/// Brings the bodies side by side.
 #[inline(always)]
-pub(super) fn gather<A: Arithmetic<Lanes: Columns>, H: HalfIsa>(
-    isa: A,
-    half: H,
+pub(super) fn gather<H: HalfIsa, C: Columns, R: Rows<C>>(
+    isa: H,
     bodies: &[Option<Body<'_>>; WIDEST],
-    nodes: &mut [Node<A::Lanes>],
-    alike: bool,
+    nodes: &mut [R],
 ) {
     let Some((any, _)) = bodies.iter().flatten().next() else { return };
-    if alike {
-        let masses = any.masses.as_flattened().iter().zip(any.inverse_masses.as_flattened());
-        for (node, (&mass, &inverse_mass)) in nodes.iter_mut().zip(masses) {
-            isa.store(isa.splat(mass), &mut node.mass);
-            isa.store(isa.splat(inverse_mass), &mut node.inverse_mass);
-        }
-    }
     let ((bodies, _), (nodes, _)) = (bodies.as_chunks::<HALF>(), nodes.as_chunks_mut::<HALF>());
     let chunks = nodes.len();
-    // As many rows as the compiler knows, so that it knows where each of them is.
-    for row in 0..ROWS {
-        if alike && row == CHANGING {
-            break;
-        }
-        for (side, bodies) in bodies[..A::Lanes::COUNT / HALF].iter().enumerate() {
+    for row in 0..R::COUNT {
+        for (half, bodies) in bodies[..C::COUNT / HALF].iter().enumerate() {
             // Looked up and cut to their length here: in the loop below that took as long as the rest.
             let values = bodies.each_ref().map(|body| {
                 // Lanes without a body repeat one.
                 let body = body.as_ref().map_or(any, |(body, _)| body);
-                let (values, _) = numbers(body, row).as_flattened().as_chunks();
+                let (values, _) = R::of(body, row).as_flattened().as_chunks();
                 &values[..chunks]
             });
             for (chunk, nodes) in nodes.iter_mut().enumerate() {
-                let mut rows = [half.splat(0.0); HALF];
+                let mut rows = [isa.splat(0.0); HALF];
                 for lane in 0..HALF {
-                    rows[lane] = half.load(&values[lane][chunk]);
+                    rows[lane] = isa.load(&values[lane][chunk]);
                 }
-                let columns = half.transpose(rows);
+                let columns = isa.transpose(rows);
                 for lane in 0..HALF {
-                    half.store(columns[lane], &mut nodes[lane].row_mut(row).halves_mut()[side]);
+                    isa.store(columns[lane], &mut nodes[lane].row_mut(row).halves_mut()[half]);
                 }
             }
         }
+    }
+}
+
+/// What bodies weigh that share their masses.
+#[inline(always)]
+pub(super) fn weigh<A: Arithmetic>(
+    isa: A,
+    body: &KernelParts<'_>,
+    weights: &mut [Weight<A::Lanes>],
+) {
+    let masses = body.masses.as_flattened().iter().zip(body.inverse_masses.as_flattened());
+    for (Weight { mass: to, inverse: to_inverse }, (&mass, &inverse)) in
+        weights.iter_mut().zip(masses)
+    {
+        isa.store(isa.splat(mass), to);
+        isa.store(isa.splat(inverse), to_inverse);
     }
 }
 
@@ -231,18 +251,21 @@ pub(super) fn scatter<H: HalfIsa, C: Columns>(
 ) {
     let ((bodies, _), (nodes, _)) = (bodies.as_chunks_mut::<HALF>(), nodes.as_chunks::<HALF>());
     let chunks = nodes.len();
-    for row in 0..CHANGING {
-        for (side, bodies) in bodies[..C::COUNT / HALF].iter_mut().enumerate() {
+    for row in 0..Node::<C>::COUNT {
+        for (half, bodies) in bodies[..C::COUNT / HALF].iter_mut().enumerate() {
             let values = bodies.each_mut().map(|body| match body {
-                Some((body, _)) => {
-                    &mut numbers_mut(body, row).as_flattened_mut().as_chunks_mut().0[..chunks]
+                Some((KernelParts { positions, velocities, .. }, _)) => {
+                    let ([x, y, z], [vx, vy, vz]) =
+                        (&mut positions.components, &mut velocities.components);
+                    let values = [x, y, z, vx, vy, vz][row].as_flattened_mut();
+                    &mut values.as_chunks_mut().0[..chunks]
                 }
                 None => &mut [],
             });
             for (chunk, nodes) in nodes.iter().enumerate() {
                 let mut columns = [isa.splat(0.0); HALF];
                 for lane in 0..HALF {
-                    columns[lane] = isa.load(&nodes[lane].row(row).halves()[side]);
+                    columns[lane] = isa.load(&nodes[lane].row(row).halves()[half]);
                 }
                 let rows = isa.transpose(columns);
                 for lane in 0..HALF {
