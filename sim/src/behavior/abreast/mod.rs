@@ -238,7 +238,7 @@ impl<V: Copy> Step<V> {
         for ((node, Weight { mass, inverse }), Force(force, _)) in
             nodes.iter_mut().zip(weights).zip(forces)
         {
-            // A compiler that vectorizes this over the nodes is slow.
+            // Else the compiler takes four nodes at a time where registers are short, which takes longer.
             black_box(());
             let force = plus(isa, load(isa, force), shared);
             let weight = times(isa, self.gravity, isa.load(mass));
