@@ -3,7 +3,7 @@
 
 use std::arch::x86_64::*;
 
-use super::avx2::{Avx2, Avx2Half};
+use super::avx2::{Avx2, Avx2Half, align_stack};
 use super::{Arithmetic, Isa, Kernel, LaneSet, Lanes3, Quad};
 use crate::geometry::{LANES, Lanes};
 
@@ -33,6 +33,7 @@ impl Avx512 {
 
 #[target_feature(enable = "avx512f,avx512vl")]
 fn with_avx512<K: Kernel>(avx512: Avx512, kernel: K) -> K::Output {
+    align_stack();
     kernel.run(avx512)
 }
 
