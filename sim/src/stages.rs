@@ -65,6 +65,8 @@ impl Stages {
     }
 
     /// Whether objects of two blocks that overlap may touch.
+    // Else the test before it, which mostly is all, would not be inlined either.
+    #[inline(never)]
     fn objects_reach(&self, a: &Block, b: &Block) -> bool {
         if !self.rules.apply(a.groups(), b.groups()) {
             return false;

@@ -167,6 +167,7 @@ impl<'s> Environment for Host<'s> {
     type Renderer = Screen<'s>;
     type Error = TableFull;
 
+    #[inline]
     fn broad_phase(&self, a: &Unit, b: &Unit) -> bool {
         self.shared.stages.broad_phase(&a.block, &b.block)
     }
