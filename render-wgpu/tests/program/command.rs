@@ -12,6 +12,8 @@ pub(super) fn command(args: &[&str]) -> Command {
     for display in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
         command.env_remove(display);
     }
+    // Without it drivers complain, beside what the program says.
+    command.env("XDG_RUNTIME_DIR", std::env::temp_dir());
     command
 }
 
