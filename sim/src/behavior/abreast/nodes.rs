@@ -255,9 +255,8 @@ pub(super) fn scatter<H: HalfIsa, C: Columns>(
         for (half, bodies) in bodies[..C::COUNT / HALF].iter_mut().enumerate() {
             let values = bodies.each_mut().map(|body| match body {
                 Some((KernelParts { positions, velocities, .. }, _)) => {
-                    let ([x, y, z], [vx, vy, vz]) =
-                        (&mut positions.components, &mut velocities.components);
-                    let values = [x, y, z, vx, vy, vz][row].as_flattened_mut();
+                    let vectors = if row < 3 { positions } else { velocities };
+                    let values = vectors.components[row % 3].as_flattened_mut();
                     &mut values.as_chunks_mut().0[..chunks]
                 }
                 None => &mut [],
