@@ -45,12 +45,13 @@ pub const FRAMES_PER_BLOCKING: u64 = 32;
 
 /// The most objects of a block. In larger ones less of the time goes to pairs of blocks, and more to objects
 /// that are nowhere near each other.
-const OBJECTS_PER_BLOCK: usize = 64;
+const OBJECTS_PER_BLOCK: usize = 72;
 /// Objects up to which each is a block of its own: few objects are heavy or uneven ones, and blocks of them
 /// would be too.
 const SINGLE_OBJECTS: usize = 64;
-/// The fewest blocks for each worker, where there are objects enough to fill the lanes of each.
-const BLOCKS_PER_WORKER: usize = 3;
+/// The fewest blocks for each worker, where there are objects enough to fill the lanes of each. With more the
+/// lanes of small blocks stay empty, with one no worker can help out another.
+const BLOCKS_PER_WORKER: usize = 2;
 
 /// Groups objects into a number of blocks that stays the same; which objects are together changes.
 ///
