@@ -43,8 +43,8 @@ pub enum BlockingError {
 /// The frames between two regroupings: in so many a particle moves by a fraction of a block.
 pub const FRAMES_PER_BLOCKING: u64 = 32;
 
-/// The most objects of a block. In larger ones less of the time goes to pairs of blocks, and more to objects
-/// that are nowhere near each other.
+/// The most objects of a block. Larger ones fill their lanes better and make fewer pairs of blocks, but look at more
+/// objects that are nowhere near each other, and leave workers less to share out between them.
 const OBJECTS_PER_BLOCK: usize = 72;
 /// Objects up to which each is a block of its own: few objects are heavy or uneven ones, and blocks of them
 /// would be too.
