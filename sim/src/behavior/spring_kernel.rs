@@ -17,7 +17,7 @@
 
 use super::spring_law::{Dashpot, Elastic, Law, load, minus, plus, splat, store, times};
 use super::{Input, batch};
-use crate::geometry::{KernelParts, LANES, Lanes, Mesh, Slot};
+use crate::geometry::{KernelParts, LANES, Lanes, Mesh, Slot, components, components_mut};
 use crate::simd::{Isa, Kernel, Lanes3, Quad};
 
 /// What one frame of a mass–spring body is computed from, besides its mesh: what [`MassSpring::begin`]
@@ -99,8 +99,8 @@ impl Kernel for Advance<'_> {
     fn run<I: Isa>(self, isa: I) {
         let Self { parts, nodes, springs } = self;
         let chunks = parts.topology.present().len();
-        gather(&mut nodes.positions, &parts.positions.components, chunks);
-        gather(&mut nodes.velocities, &parts.velocities.components, chunks);
+        gather(&mut nodes.positions, components(parts.positions), chunks);
+        gather(&mut nodes.velocities, components(parts.velocities), chunks);
         nodes.pulled.clear();
         nodes.pulled.resize(chunks, Lanes3::default());
         if springs.damping > 0.0 {
@@ -114,23 +114,23 @@ impl Kernel for Advance<'_> {
         for _ in 0..springs.substeps {
             step.advance(isa, &parts, nodes, edges, to_center);
         }
-        scatter(&nodes.positions, &mut parts.positions.components);
-        scatter(&nodes.velocities, &mut parts.velocities.components);
+        scatter(&nodes.positions, components_mut(parts.positions));
+        scatter(&nodes.velocities, components_mut(parts.velocities));
     }
 }
 
 /// Puts the components of each chunk side by side. There are `len` chunks then, or a panic.
 #[inline(always)]
-fn gather(chunks: &mut Vec<Lanes3>, components: &[Vec<Lanes>; 3], len: usize) {
-    let [x, y, z] = components.each_ref().map(|component| &component[..len]);
+fn gather(chunks: &mut Vec<Lanes3>, components: [&[Lanes]; 3], len: usize) {
+    let [x, y, z] = components.map(|component| &component[..len]);
     chunks.clear();
     chunks.extend(x.iter().zip(y).zip(z).map(|((&x, &y), &z)| Lanes3([x, y, z])));
 }
 
 /// The other way.
 #[inline(always)]
-fn scatter(chunks: &[Lanes3], components: &mut [Vec<Lanes>; 3]) {
-    for (axis, component) in components.iter_mut().enumerate() {
+fn scatter(chunks: &[Lanes3], components: [&mut [Lanes]; 3]) {
+    for (axis, component) in components.into_iter().enumerate() {
         for (lanes, chunk) in component.iter_mut().zip(chunks) {
             *lanes = chunk.0[axis];
         }

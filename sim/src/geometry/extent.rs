@@ -53,11 +53,12 @@ impl Kernel for Measure<'_> {
         // A number times zero is zero, an infinity or a NaN times zero is a NaN.
         let nothing = isa.splat(0.0);
         let mut zeros = nothing;
+        let (positions, velocities) = (mesh.positions.components(), mesh.velocities.components());
         for axis in 0..3 {
             let mut low = isa.splat(f32::INFINITY);
             let mut high = isa.splat(f32::NEG_INFINITY);
             let mut sum = nothing;
-            for (chunk, lanes) in mesh.positions.components[axis].iter().enumerate() {
+            for (chunk, lanes) in positions[axis].iter().enumerate() {
                 let values = isa.load(lanes);
                 let hidden = isa.load(hidden_after(nodes - chunk * LANES));
                 low = isa.min(isa.add(values, hidden), low);
@@ -65,7 +66,7 @@ impl Kernel for Measure<'_> {
                 sum = isa.add(sum, values);
                 zeros = isa.add(zeros, isa.mul(values, nothing));
             }
-            for lanes in &mesh.velocities.components[axis] {
+            for lanes in velocities[axis] {
                 zeros = isa.add(zeros, isa.mul(isa.load(lanes), nothing));
             }
             extent.bounds.min[axis] = least(isa, low) - mesh.contact_radius();

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::extent::{Extent, Measure};
 use super::topology::Topology;
-use super::vectors::{Lanes, Vectors, in_lanes};
+use super::vectors::{Lanes, Line, Vectors, in_lanes};
 use crate::simd::Simd;
 
 /// Why a mesh cannot be built.
@@ -159,7 +159,7 @@ impl Mesh {
     /// Changes the velocities of all nodes by equal shares of an impulse, in newton seconds.
     pub fn apply_body_impulse(&mut self, impulse: Vec3) {
         let share = (impulse / self.topology.nodes().max(1) as f32).to_array();
-        for (component, share) in self.velocities.components.iter_mut().zip(share) {
+        for (component, share) in self.velocities.components_mut().into_iter().zip(share) {
             for (velocities, inverse_masses) in component.iter_mut().zip(&self.masses.inverse) {
                 for (velocity, inverse_mass) in velocities.iter_mut().zip(inverse_masses) {
                     *velocity += share * inverse_mass;
@@ -170,7 +170,7 @@ impl Mesh {
 
     /// Multiplies the velocities of all nodes that are not held fast.
     pub(crate) fn damp(&mut self, factor: f32) {
-        for component in &mut self.velocities.components {
+        for component in self.velocities.components_mut() {
             for (velocities, masses) in component.iter_mut().zip(&self.masses.masses) {
                 for (velocity, &mass) in velocities.iter_mut().zip(masses) {
                     *velocity *= if mass > 0.0 { factor } else { 1.0 };
@@ -190,7 +190,7 @@ impl Mesh {
     #[inline]
     pub(crate) fn fetch(&self) {
         let mut sum = 0.0;
-        for lanes in self.positions.components.iter().chain(&self.velocities.components).flatten() {
+        for Line(lanes) in self.positions.lines().iter().chain(self.velocities.lines()) {
             sum += lanes[0];
         }
         std::hint::black_box(sum);
@@ -225,8 +225,8 @@ impl Mesh {
     pub(crate) fn kernel_parts(&mut self) -> KernelParts<'_> {
         KernelParts {
             topology: &self.topology,
-            positions: &mut self.positions,
-            velocities: &mut self.velocities,
+            positions: self.positions.lines_mut(),
+            velocities: self.velocities.lines_mut(),
             masses: &self.masses.masses,
             inverse_masses: &self.masses.inverse,
         }
@@ -240,8 +240,8 @@ fn check_length(what: &'static str, given: usize, nodes: usize) -> Result<(), Me
 /// A mesh, taken apart for a kernel.
 pub(crate) struct KernelParts<'a> {
     pub(crate) topology: &'a Topology,
-    pub(crate) positions: &'a mut Vectors,
-    pub(crate) velocities: &'a mut Vectors,
+    pub(crate) positions: &'a mut [Line],
+    pub(crate) velocities: &'a mut [Line],
     pub(crate) masses: &'a [Lanes],
     pub(crate) inverse_masses: &'a [Lanes],
 }

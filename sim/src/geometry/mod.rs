@@ -23,6 +23,7 @@ pub use rigid::Rigid;
 pub(crate) use topology::Slot;
 pub use topology::{Spring, Topology, TopologyError, edges};
 pub use vectors::{LANES, Lanes, Vectors};
+pub(crate) use vectors::{Line, component, component_mut, components, components_mut};
 pub use volume::{BRICK_SIDE, BRICK_VOXELS, Brick, Part, Volume, VolumeError, Voxel};
 
 use crate::simd::Simd;

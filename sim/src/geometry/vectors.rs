@@ -1,5 +1,6 @@
 //! Vectors of a body's nodes, stored component by component in whole SIMD lanes.
 
+use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 use glam::Vec3;
 
 /// Nodes that the kernels handle at once. Sums over lanes are taken in a fixed order, so this number
@@ -9,12 +10,16 @@ pub const LANES: usize = 16;
 /// One component of [`LANES`] consecutive nodes.
 pub type Lanes = [f32; LANES];
 
-/// One vector per node, as separate x, y and z arrays that are padded with zeros to whole
+/// [`Lanes`] in a cache line of their own: every load across two lines would take longer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub(crate) struct Line(pub(crate) Lanes);
+
+/// One vector per node, as x, y and z arrays one after the other, each padded with zeros to whole
 /// [`Lanes`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Vectors {
-    /// The components x, y and z, all of the same length.
-    pub(crate) components: [Vec<Lanes>; 3],
+    lines: Vec<Line>,
     len: usize,
 }
 
@@ -22,8 +27,7 @@ impl Vectors {
     /// `len` zero vectors.
     #[must_use]
     pub fn zeros(len: usize) -> Self {
-        let chunks = len.div_ceil(LANES);
-        Self { components: std::array::from_fn(|_| vec![[0.0; LANES]; chunks]), len }
+        Self { lines: vec![Line::default(); 3 * len.div_ceil(LANES)], len }
     }
 
     /// The given vectors.
@@ -51,15 +55,16 @@ impl Vectors {
     /// The vector at `index`, or `None` past the last.
     #[must_use]
     pub fn get(&self, index: usize) -> Option<Vec3> {
-        let at = |axis: usize| self.components[axis].as_flattened()[index];
+        let components = self.components();
+        let at = |axis: usize| components[axis].as_flattened()[index];
         (index < self.len).then(|| Vec3::new(at(0), at(1), at(2)))
     }
 
     /// Replaces the vector at `index`; an index past the last is ignored.
     pub fn set(&mut self, index: usize, vector: Vec3) {
         if index < self.len {
-            for (axis, value) in vector.to_array().into_iter().enumerate() {
-                self.components[axis].as_flattened_mut()[index] = value;
+            for (component, value) in self.components_mut().into_iter().zip(vector.to_array()) {
+                component.as_flattened_mut()[index] = value;
             }
         }
     }
@@ -74,13 +79,37 @@ impl Vectors {
     /// The x, y and z components, without the padding.
     #[must_use]
     pub fn as_slices(&self) -> [&[f32]; 3] {
-        self.components.each_ref().map(|component| &component.as_flattened()[..self.len])
+        self.components().map(|component| &component.as_flattened()[..self.len])
     }
 
     /// As [`Vectors::as_slices`], to be replaced.
     pub fn as_mut_slices(&mut self) -> [&mut [f32]; 3] {
         let len = self.len;
-        self.components.each_mut().map(|component| &mut component.as_flattened_mut()[..len])
+        self.components_mut().map(|component| &mut component.as_flattened_mut()[..len])
+    }
+
+    /// The x, y and z components, all of the same length.
+    #[inline(always)]
+    pub(crate) fn components(&self) -> [&[Lanes]; 3] {
+        components(&self.lines)
+    }
+
+    /// As [`Vectors::components`], to be replaced.
+    #[inline(always)]
+    pub(crate) fn components_mut(&mut self) -> [&mut [Lanes]; 3] {
+        components_mut(&mut self.lines)
+    }
+
+    /// The components one after the other.
+    #[inline(always)]
+    pub(crate) fn lines(&self) -> &[Line] {
+        &self.lines
+    }
+
+    /// As [`Vectors::lines`], to be replaced.
+    #[inline(always)]
+    pub(crate) fn lines_mut(&mut self) -> &mut [Line] {
+        &mut self.lines
     }
 
     /// All vectors in order.
@@ -91,11 +120,41 @@ impl Vectors {
 
     /// Becomes a copy of `other` without giving up memory.
     pub(crate) fn copy_from(&mut self, other: &Self) {
-        for (to, from) in self.components.iter_mut().zip(&other.components) {
-            to.clone_from(from);
-        }
+        self.lines.clone_from(&other.lines);
         self.len = other.len;
     }
+}
+
+/// The x, y and z components of vectors' lines.
+#[inline(always)]
+pub(crate) fn components(lines: &[Line]) -> [&[Lanes]; 3] {
+    let lanes: &[Lanes] = cast_slice(lines);
+    let (x, others) = lanes.split_at(lanes.len() / 3);
+    let (y, z) = others.split_at(x.len());
+    [x, y, z]
+}
+
+/// One of them.
+#[inline(always)]
+pub(crate) fn component(lines: &[Line], axis: usize) -> &[Lanes] {
+    let chunks = lines.len() / 3;
+    &cast_slice(lines)[axis * chunks..][..chunks]
+}
+
+/// One of them.
+#[inline(always)]
+pub(crate) fn component_mut(lines: &mut [Line], axis: usize) -> &mut [Lanes] {
+    let chunks = lines.len() / 3;
+    &mut cast_slice_mut(lines)[axis * chunks..][..chunks]
+}
+
+/// As [`components`], to be replaced.
+#[inline(always)]
+pub(crate) fn components_mut(lines: &mut [Line]) -> [&mut [Lanes]; 3] {
+    let lanes: &mut [Lanes] = cast_slice_mut(lines);
+    let (x, others) = lanes.split_at_mut(lanes.len() / 3);
+    let (y, z) = others.split_at_mut(x.len());
+    [x, y, z]
 }
 
 /// `len` numbers, padded with zeros.

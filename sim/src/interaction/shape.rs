@@ -30,7 +30,7 @@ impl Detection for NodesInShape {
 fn behind_plane(mesh: &Mesh, point: Vec3, normal: Vec3, touches: &mut Touches) {
     let reach = mesh.contact_radius() + point.dot(normal);
     let [nx, ny, nz] = normal.to_array();
-    let [x, y, z] = mesh.positions.components.each_ref();
+    let [x, y, z] = mesh.positions.components();
     for (chunk, ((x, y), z)) in x.iter().zip(y).zip(z).enumerate() {
         let mut depths = [0.0; LANES];
         for lane in 0..LANES {

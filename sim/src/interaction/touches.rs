@@ -1,9 +1,9 @@
 //! The results module of an interaction pair (Fig. 3): what detection found.
 
-use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
+use bytemuck::{cast_slice, cast_slice_mut};
 use glam::Vec3;
 
-use crate::geometry::{Bounds, LANES, Lanes, Mesh};
+use crate::geometry::{Bounds, LANES, Lanes, Line, Mesh};
 use crate::simd::{Isa, LaneSet, Simd, first_lanes, greatest, least};
 
 /// A place where two objects touch.
@@ -60,11 +60,6 @@ impl Touches {
     }
 }
 
-/// [`Lanes`] in a cache line of their own: every load across two lines would take longer.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C, align(64))]
-struct Line(Lanes);
-
 /// The nodes of a mesh that are in reach of another object.
 #[derive(Debug, Default)]
 pub(super) struct NearNodes {
@@ -77,7 +72,7 @@ impl NearNodes {
     /// Takes the nodes inside `bounds`, in ascending order.
     #[inline(always)]
     pub(super) fn select<I: Isa>(&mut self, isa: I, mesh: &Mesh, bounds: &Bounds) {
-        let [x, y, z] = mesh.positions.components.each_ref();
+        let [x, y, z] = mesh.positions.components();
         self.reserve(x.len());
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
         let nodes = mesh.positions.len();

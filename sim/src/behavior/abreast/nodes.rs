@@ -5,7 +5,7 @@ use std::slice;
 
 use super::super::spring_kernel::Springs;
 use super::WIDEST;
-use crate::geometry::{KernelParts, LANES, Lanes};
+use crate::geometry::{KernelParts, LANES, Lanes, component, component_mut};
 use crate::simd::{Arithmetic, HALF, HalfIsa, HalfLanes};
 
 /// One number of each body.
@@ -123,7 +123,7 @@ impl<C> Rows<C> for Node<C> {
     #[inline(always)]
     fn of<'b>(body: &'b KernelParts<'_>, index: usize) -> &'b [Lanes] {
         let KernelParts { positions, velocities, .. } = body;
-        if index < 3 { &positions.components[index] } else { &velocities.components[index - 3] }
+        if index < 3 { component(positions, index) } else { component(velocities, index - 3) }
     }
 }
 
@@ -256,7 +256,7 @@ pub(super) fn scatter<H: HalfIsa, C: Columns>(
             let values = bodies.each_mut().map(|body| match body {
                 Some((KernelParts { positions, velocities, .. }, _)) => {
                     let vectors = if row < 3 { positions } else { velocities };
-                    let values = vectors.components[row % 3].as_flattened_mut();
+                    let values = component_mut(vectors, row % 3).as_flattened_mut();
                     &mut values.as_chunks_mut().0[..chunks]
                 }
                 None => &mut [],
