@@ -43,15 +43,19 @@ pub enum BlockingError {
 /// The frames between two regroupings: in so many a particle moves by a fraction of a block.
 pub const FRAMES_PER_BLOCKING: u64 = 32;
 
-/// The most objects of a block. Larger ones fill their lanes better and make fewer pairs of blocks, but look at more
-/// objects that are nowhere near each other, and leave workers less to share out between them.
-const OBJECTS_PER_BLOCK: usize = 72;
 /// Objects up to which each is a block of its own: few objects are heavy or uneven ones, and blocks of them
 /// would be too.
 const SINGLE_OBJECTS: usize = 64;
-/// The fewest blocks for each worker, where there are objects enough to fill the lanes of each. With more the
-/// lanes of small blocks stay empty, with one no worker can help out another.
-const BLOCKS_PER_WORKER: usize = 2;
+/// Blocks for each object to the power of 2/3; usually 0.1. The tests between blocks grow as the square of their
+/// number, those within blocks as the square of the objects of each: with that power both stay in balance.
+const BLOCKS: f64 = 0.1;
+/// The fewest blocks for each worker: with one none could help out another.
+const FEWEST_PER_WORKER: usize = 2;
+/// So many share out better, if each has [`FILLING`] objects.
+const USUAL_PER_WORKER: usize = 4;
+/// Objects of a block that leave few of its lanes empty, however uneven they are; usually 60, twice as many as
+/// are advanced side by side.
+const FILLING: usize = 60;
 
 /// Groups objects into a number of blocks that stays the same; which objects are together changes.
 ///
@@ -239,9 +243,12 @@ fn block_count(objects: usize, workers: usize) -> usize {
         return objects;
     }
     let workers = workers.max(1);
+    let fewest_tests = (BLOCKS * (objects as f64).cbrt().powi(2)).round() as usize;
+    let [fewest, usual] = [FEWEST_PER_WORKER, USUAL_PER_WORKER].map(|blocks| blocks * workers);
+    let shared_out = (objects / FILLING).clamp(fewest, usual);
     // No worker is to have one more than another.
-    let wanted = objects.div_ceil(OBJECTS_PER_BLOCK).next_multiple_of(workers);
-    wanted.max(BLOCKS_PER_WORKER * workers).min(objects.div_ceil(HALF))
+    let wanted = fewest_tests.max(shared_out).next_multiple_of(workers);
+    wanted.min(objects.div_ceil(HALF))
 }
 
 impl Key {

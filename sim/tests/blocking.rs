@@ -6,6 +6,7 @@ use common::{particles, point};
 use dualframe_sim::behavior::Fixed;
 use dualframe_sim::block::Block;
 use dualframe_sim::blocking::{Blocking, BlockingError, Grain};
+use dualframe_sim::geometry::Bounds;
 use dualframe_sim::object::Object;
 
 fn numbers(block: &Block) -> Vec<u32> {
@@ -24,11 +25,15 @@ fn number_and_size_of_blocks() {
         (64, 1, 64),
         (65, 1, 2),
         (100, 2, 4),
-        (300, 1, 5),
+        (300, 1, 4),
+        (300, 2, 6),
         (300, 8, 16),
         (300, 64, 38),
-        (1_000, 2, 14),
+        (500, 2, 8),
+        (1_000, 2, 10),
+        (4_000, 2, 26),
         (4_000, 16, 64),
+        (10_000, 2, 46),
     ] {
         let blocks = blocks(particles(objects, false, true).objects, Grain::Spatial, workers);
         assert_eq!(blocks.len(), expected + 1, "{objects} particles, {workers} workers");
@@ -78,10 +83,12 @@ fn blocks_that_were_not_drained_keep_their_objects() {
 #[test]
 fn blocks_of_particles_are_compact() {
     let blocks = blocks(particles(1_000, false, true).objects, Grain::Spatial, 1);
-    let side = |block: &Block| (block.bounds().max - block.bounds().min).max_element();
-    // 72 particles in a cube of the lattice need 1.25 m.
-    let widest = blocks[..14].iter().map(side).fold(0.0, f32::max);
-    assert!(widest < 1.6, "{widest} m");
+    let particles = &blocks[..10];
+    let side = |bounds: Bounds| (bounds.max - bounds.min).max_element();
+    let widest = particles.iter().map(|block| side(block.bounds())).fold(0.0, f32::max);
+    let all = particles.iter().fold(Bounds::EMPTY, |all, block| all.union(&block.bounds()));
+    // By their numbers they would be in layers as wide as all of them.
+    assert!(widest < 0.7 * side(all), "{widest} m of {} m", side(all));
 }
 
 #[test]

@@ -59,9 +59,9 @@ pub trait Response: Send + Sync {
 /// interaction need not allocate.
 const NODES: usize = 256;
 
-/// Pairs of objects of two blocks for which there is room from the start, likewise; usually 5,184, as many as
-/// two full blocks can have.
-const PAIRS: usize = 5_184;
+/// Pairs of objects whose boxes overlap, of two blocks or within one, for which there is room from the start,
+/// likewise; usually 4,096, some twenty for each of two hundred objects.
+const PAIRS: usize = 4_096;
 
 /// Memory that the interactions of one worker use one after the other.
 #[derive(Debug)]
