@@ -12,7 +12,6 @@ use glam::Vec3;
 
 use crate::behavior::{Input, SpringWork, Workspace, batch};
 use crate::block::Block;
-use crate::geometry::Mesh;
 use crate::interaction::{
     ContactBuffer, ContactRecord, Member, PairScratch, Rules, Scratch, Segment,
 };
@@ -147,16 +146,9 @@ impl Stages {
         post: &mut dyn FnMut(ObjectId, ObjectId, Message),
     ) {
         let began = frame.is_multiple_of(FRAMES_PER_TIMING).then(Instant::now);
-        let Workspace { received: memory, springs, fetches } = workspace;
+        let Workspace { received: memory, springs } = workspace;
         let mut received = mem::take(memory);
         received.extend(block, results);
-        if *fetches {
-            block
-                .objects
-                .iter()
-                .filter_map(|object| object.geometry.as_mesh())
-                .for_each(Mesh::fetch);
-        }
         for (place, object) in block.objects.iter_mut().enumerate() {
             let received = received.at(place);
             if object.quarantined().is_some() {

@@ -10,10 +10,6 @@ pub(crate) const CONTACTS_PER_OBJECT: usize = 120;
 /// Other objects that one object touches at once, likewise; usually 24, twice the densest packing's.
 const TOUCHED_PER_OBJECT: usize = 24;
 
-/// Bytes of bodies' state from which on an update fetches its block's first; usually 1 MiB, a second-level
-/// cache: less than that stays in it from frame to frame.
-const CACHED: usize = 1 << 20;
-
 /// Memory that updates use. It belongs to a thread, not to a block, so that it is still in the thread's
 /// caches when the next block comes.
 #[derive(Debug, Default)]
@@ -21,8 +17,6 @@ pub struct Workspace {
     /// Empty between two updates.
     pub(crate) received: Received<'static>,
     pub(crate) springs: SpringWork,
-    /// Whether bodies are to be fetched into the caches before they are updated.
-    pub(crate) fetches: bool,
 }
 
 /// What springs are advanced in.
@@ -44,20 +38,17 @@ pub(crate) struct Room {
     nodes: usize,
     /// Nodes of a body that may be advanced beside others.
     abreast: usize,
-    /// Bytes of all bodies' state.
-    state: usize,
 }
 
 impl Room {
     /// What these blocks need, now and when their objects are dealt out anew.
     pub(crate) fn of<'b>(blocks: impl Iterator<Item = &'b Block>) -> Self {
-        let mut room = Self { objects: 0, nodes: 0, abreast: 0, state: 0 };
+        let mut room = Self { objects: 0, nodes: 0, abreast: 0 };
         for block in blocks {
             room.objects = room.objects.max(block.objects.capacity());
             let meshes = block.objects.iter().filter_map(|object| object.geometry.as_mesh());
             for nodes in meshes.map(|mesh| mesh.topology().nodes()) {
                 room.nodes = room.nodes.max(nodes);
-                room.state += nodes * 2 * size_of::<[f32; 3]>();
                 if batch::may_be_abreast(nodes) {
                     room.abreast = room.abreast.max(nodes);
                 }
@@ -75,8 +66,8 @@ impl Room {
 impl Workspace {
     /// Memory that usually need not grow.
     pub(crate) fn with_room(room: Room) -> Self {
-        let mut workspace = Self { fetches: room.state > CACHED, ..Self::default() };
-        let Self { received, springs, .. } = &mut workspace;
+        let mut workspace = Self::default();
+        let Self { received, springs } = &mut workspace;
         received.reserve(room.objects, room.objects * TOUCHED_PER_OBJECT);
         springs.waiting.reserve(room.objects);
         springs.indices.reserve(room.objects);

@@ -185,17 +185,6 @@ impl Mesh {
         self.extent(Simd::detect()).center
     }
 
-    /// Reads one number of every cache line, all at once: whoever computes with them next would wait for
-    /// each in turn.
-    #[inline]
-    pub(crate) fn fetch(&self) {
-        let mut sum = 0.0;
-        for Line(lanes) in self.positions.lines().iter().chain(self.velocities.lines()) {
-            sum += lanes[0];
-        }
-        std::hint::black_box(sum);
-    }
-
     /// Where it is, by these instructions.
     pub(super) fn extent(&self, simd: Simd) -> Extent {
         simd.run(Measure(self))

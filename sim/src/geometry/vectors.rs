@@ -100,13 +100,7 @@ impl Vectors {
         components_mut(&mut self.lines)
     }
 
-    /// The components one after the other.
-    #[inline(always)]
-    pub(crate) fn lines(&self) -> &[Line] {
-        &self.lines
-    }
-
-    /// As [`Vectors::lines`], to be replaced.
+    /// The components one after the other, to be replaced.
     #[inline(always)]
     pub(crate) fn lines_mut(&mut self) -> &mut [Line] {
         &mut self.lines
