@@ -32,9 +32,8 @@ const MOST_CARRIED: usize = 32;
 const MOST_CARRIED: usize = 1;
 
 /// Interactions of the frame being gathered that a worker keeps while it can update: what it does when
-/// nothing is left but updates that others are at, for which the frame's opening waits. Usually 16, about
-/// an update's time.
-const RESERVE: usize = MOST_CARRIED / 2;
+/// nothing is left but updates that others are at, for which the frame's opening waits. Usually 4.
+const RESERVE: usize = MOST_CARRIED / 8;
 
 /// Carry-over (§4.2): outputs are carried as long as nobody is hungry; and how many sleepers what was
 /// queued is to wake.
@@ -122,7 +121,13 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
             Some(_) => self.works.pop(),
             None => self.pop_update(),
         };
-        other.or_else(|| self.interactions.pop_front().map(Work::Interact))
+        if other.is_some() {
+            return other;
+        }
+        // Of those that nobody waits for the newest: its units are in this worker's caches.
+        let id =
+            if is_awaited { self.interactions.pop_front() } else { self.interactions.pop_back() };
+        id.map(Work::Interact)
     }
 
     /// An update that is queued at this worker's home.

@@ -14,8 +14,8 @@ use dualframe_core::worker::Step;
 use dualframe_tests::watchdog;
 
 use crowd::{
-    Crowd, ENTERED, FAR, IDLE, INTERACTED, NEAR, Notes, RENDERED, UPDATED, alone, finish, hold,
-    units, with, with_notes,
+    Crowd, ENTERED, FAR, IDLE, INTERACTED, Log, NEAR, Notes, RENDERED, UPDATED, alone, finish,
+    hold, units, with, with_notes,
 };
 
 #[test]
@@ -54,20 +54,29 @@ fn a_probe_sees_every_work_unit() {
 fn interactions_of_the_next_frame_are_kept_while_there_are_updates() {
     with(8, 1, 1, |mut pipeline, _| {
         pipeline.run(2).expect("at rest");
-        let mut worker = pipeline.worker();
+        let mut log = Log::default();
+        let mut worker = pipeline.worker().probed(&mut log);
         for met in 0..8 {
             assert_eq!(worker.step(&NEAR), ENTERED);
             // Nothing else is to be done yet; and then updates wait for them.
             (0..met).for_each(|_| assert_eq!(worker.step(&NEAR), INTERACTED));
         }
-        for _ in 0..7 {
+        // Of the 6 that four units have, and then of more, 4 are kept.
+        for done in [0, 0, 0, 2, 4, 5, 6] {
             assert_eq!([worker.step(&NEAR), worker.step(&NEAR)], [UPDATED, ENTERED]);
+            (0..done).for_each(|_| assert_eq!(worker.step(&NEAR), INTERACTED));
         }
-        // Of the 21 that seven units have, 16 are kept.
-        (0..5).for_each(|_| assert_eq!(worker.step(&NEAR), INTERACTED));
         assert_eq!([worker.step(&NEAR), worker.step(&NEAR)], [UPDATED, ENTERED]);
-        (0..16 + 7).for_each(|_| assert_eq!(worker.step(&NEAR), INTERACTED));
+        (0..4 + 7).for_each(|_| assert_eq!(worker.step(&NEAR), INTERACTED));
         assert_eq!(worker.step(&NEAR), IDLE, "the next updates wait for renderings");
+        drop(worker);
+        let next = log.begun.iter().filter(|(_, frame)| *frame == Frame(1));
+        let met = next
+            .filter_map(|(work, _)| if let Work::Interact(id) = work { Some(id.0) } else { None });
+        let met = Vec::from_iter(met);
+        let oldest = *met.iter().min().expect("there are 28");
+        assert_eq!([met[0], met[1]].map(|id| id - oldest), [5, 4], "the newest while nobody waits");
+        assert_eq!([met[17], met[18]].map(|id| id - oldest), [0, 1], "the oldest once updates do");
     });
 }
 
