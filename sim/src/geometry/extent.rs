@@ -16,6 +16,9 @@ pub struct Extent {
     /// The middle of it, in metres: the mean of a surface's nodes, a rigid shape's origin, a volume's
     /// middle.
     pub center: Vec3,
+    /// The radius of a sphere around `center` that holds all of a surface, contact spheres included, in metres;
+    /// infinite for what is no surface.
+    pub radius: f32,
     /// Whether every number in it that changes is finite, and the box, unless it is empty.
     pub finite: bool,
 }
@@ -24,7 +27,7 @@ impl Extent {
     /// Of a geometry whose numbers are finite or not. Finite numbers may still be too large for a box.
     pub(super) fn new(bounds: Bounds, center: Vec3, finite: bool) -> Self {
         let boxed = bounds.is_finite() || bounds == Bounds::EMPTY;
-        Self { bounds, center, finite: finite && boxed }
+        Self { bounds, center, radius: f32::INFINITY, finite: finite && boxed }
     }
 }
 
@@ -39,7 +42,7 @@ const HIDDEN: [f32; 2 * LANES] = {
     hidden
 };
 
-/// The measuring of a mesh, in one pass over its nodes.
+/// The measuring of a mesh: box and middle in one pass over its nodes, the radius in a second.
 pub(super) struct Measure<'a>(pub(super) &'a Mesh);
 
 impl Kernel for Measure<'_> {
@@ -49,7 +52,7 @@ impl Kernel for Measure<'_> {
     fn run<I: Isa>(self, isa: I) -> Extent {
         let Self(mesh) = self;
         let nodes = mesh.positions.len();
-        let mut extent = Extent { bounds: Bounds::EMPTY, center: Vec3::ZERO, finite: true };
+        let mut extent = Extent::new(Bounds::EMPTY, Vec3::ZERO, true);
         // A number times zero is zero, an infinity or a NaN times zero is a NaN.
         let nothing = isa.splat(0.0);
         let mut zeros = nothing;
@@ -74,8 +77,26 @@ impl Kernel for Measure<'_> {
             extent.center[axis] = isa.sum(sum) / nodes.max(1) as f32;
         }
         extent.finite = isa.at_most(zeros, nothing) == first_lanes(LANES);
+        extent.radius = farthest(isa, positions, nodes, extent.center) + mesh.contact_radius();
         extent
     }
+}
+
+/// The distance from `center` to the farthest of so many nodes.
+#[inline(always)]
+fn farthest<I: Isa>(isa: I, positions: [&[Lanes]; 3], nodes: usize, center: Vec3) -> f32 {
+    let mut most = isa.splat(0.0);
+    let [xs, ys, zs] = positions;
+    for (chunk, ((x, y), z)) in xs.iter().zip(ys).zip(zs).enumerate() {
+        // Negative where there is no node.
+        let mut square = isa.sub(isa.splat(0.0), isa.load(hidden_after(nodes - chunk * LANES)));
+        for (values, middle) in [x, y, z].into_iter().zip(center.to_array()) {
+            let way = isa.sub(isa.load(values), isa.splat(middle));
+            square = isa.add(square, isa.mul(way, way));
+        }
+        most = isa.max(square, most);
+    }
+    greatest(isa, most).sqrt()
 }
 
 /// What hides all lanes after the first so many.
@@ -107,17 +128,19 @@ mod tests {
     }
 
     #[test]
-    fn padding_is_outside_of_the_box() {
+    fn padding_is_outside_of_box_and_sphere() {
         for count in [1, LANES - 1, LANES, LANES + 1, 42, 48] {
             for simd in Simd::available() {
                 let (first, last) = (Vec3::new(3.0, 4.0, 5.0), 0.1 * (count - 1) as f32);
-                let Extent { bounds, center, finite } = extent(mesh(count), simd);
+                let Extent { bounds, center, radius, finite } = extent(mesh(count), simd);
                 assert!((bounds.min - (first - RADIUS)).length() < 1e-5, "{count}, {simd:?}");
                 assert!(
                     (bounds.max - (first + last + RADIUS)).length() < 1e-5,
                     "{count}, {simd:?}"
                 );
                 assert!((center - (first + last / 2.0)).length() < 1e-5, "{count}, {simd:?}");
+                let to_the_ends = Vec3::splat(last / 2.0).length();
+                assert!((radius - (to_the_ends + RADIUS)).abs() < 1e-5, "{count}, {simd:?}");
                 assert!(finite, "{count}, {simd:?}");
             }
         }

@@ -50,6 +50,7 @@ pub struct Object {
     quarantined: Option<Fault>,
     bounds: Bounds,
     center: Vec3,
+    radius: f32,
     /// What an update takes, in seconds, as its share of its block's last ones that were timed; 0 before
     /// the first.
     cost: f32,
@@ -80,6 +81,7 @@ impl Object {
             quarantined: None,
             bounds: Bounds::EMPTY,
             center: Vec3::ZERO,
+            radius: 0.0,
             cost: 0.0,
             visual: VisualProperties::default(),
             drawing: Drawing::default(),
@@ -139,6 +141,13 @@ impl Object {
         self.center
     }
 
+    /// The radius of a sphere around [`Object::center`] that held all of a surface after its last update, contact
+    /// spheres included, in metres; infinite for what is no surface.
+    #[must_use]
+    pub fn radius(&self) -> f32 {
+        self.radius
+    }
+
     /// What an update takes, in seconds, as its share of its block's last ones that were timed; 0 before
     /// the first.
     #[must_use]
@@ -173,11 +182,12 @@ impl Object {
         self.fit(self.geometry.extent(Simd::detect()));
     }
 
-    fn fit(&mut self, Extent { bounds, center, finite }: Extent) {
+    fn fit(&mut self, Extent { bounds, center, radius, finite }: Extent) {
         if self.quarantined.is_none() {
             // In a union a box of no meaning would make others of those before it.
             self.bounds = if finite { bounds } else { Bounds::EMPTY };
             self.center = center;
+            self.radius = radius;
         }
     }
 
@@ -224,6 +234,7 @@ impl Object {
             quarantined: self.quarantined,
             bounds: self.bounds,
             center: self.center,
+            radius: self.radius,
             cost: self.cost,
             visual: self.visual,
             drawing: self.drawing,
@@ -243,6 +254,7 @@ impl Object {
         snapshot.quarantined = self.quarantined;
         snapshot.bounds = self.bounds;
         snapshot.center = self.center;
+        snapshot.radius = self.radius;
         snapshot.visual = self.visual;
         snapshot.drawing = self.drawing;
         match (&self.geometry, &mut snapshot.geometry) {
