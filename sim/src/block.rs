@@ -1,22 +1,25 @@
 //! Blocks of spatially close objects: the units that executors schedule.
 
-use crate::geometry::{Bounds, LANES, Lanes};
+use glam::Vec3;
+
+use crate::geometry::{Bounds, Extent, LANES, Lanes, ROUNDING_MARGIN};
 use crate::interaction::{Member, group_set};
 use crate::object::{Object, ObjectId};
 use crate::simd::{Isa, Kernel, LaneSet, Simd, first_lanes, lanes};
 
 /// One or more objects that go through the stages together, in ascending order of their numbers.
 ///
-/// What every other block asks of it in every frame is in its first cache line.
+/// What every other block asks first, in every frame, is in its first cache line.
 #[derive(Default)]
 #[repr(C, align(64))]
 pub struct Block {
-    bounds: Bounds,
+    /// Around all its objects that may interact; without a sphere if they are several.
+    extent: Extent,
     groups: u32,
     /// The objects' numbers: all in few cache lines, which the objects are not.
     ids: Vec<ObjectId>,
     pub(crate) objects: Vec<Object>,
-    boxes: Boxes,
+    extents: Extents,
 }
 
 impl Block {
@@ -39,7 +42,13 @@ impl Block {
     #[must_use]
     #[inline]
     pub fn bounds(&self) -> Bounds {
-        self.bounds
+        self.extent.bounds
+    }
+
+    /// The extent of its one object, or the box around all of several that may interact.
+    #[inline]
+    pub(crate) fn extent(&self) -> &Extent {
+        &self.extent
     }
 
     /// The groups of its objects that may interact, a bit each.
@@ -52,25 +61,30 @@ impl Block {
         self.objects.reserve(objects);
         self.ids.clear();
         self.ids.reserve(objects);
-        self.boxes.reserve(objects);
+        self.extents.reserve(objects);
     }
 
-    /// Brings numbers, boxes and groups up to date with the objects.
+    /// Brings numbers, extents and groups up to date with the objects.
     pub(crate) fn refresh(&mut self) {
         self.ids.clear();
         self.ids.extend(self.objects.iter().map(Object::id));
-        self.boxes.resize(self.objects.len());
+        self.extents.resize(self.objects.len());
         self.groups = 0;
         let mut bounds = Bounds::EMPTY;
         for (place, object) in self.objects.iter().enumerate() {
-            let own = object.interaction_bounds();
-            self.boxes.set(place, &own);
-            bounds = bounds.union(&own);
-            if own != Bounds::EMPTY {
+            let own = object.interaction_extent();
+            self.extents.set(place, &own);
+            bounds = bounds.union(&own.bounds);
+            if own.bounds != Bounds::EMPTY {
                 self.groups |= group_set(object.group());
             }
         }
-        self.bounds = bounds;
+        self.enclose(bounds);
+    }
+
+    /// Sets its own extent by the box around all.
+    fn enclose(&mut self, bounds: Bounds) {
+        self.extent = if self.is_single() { self.extents.at(0) } else { Extent::of_box(bounds) };
     }
 
     /// Whether an object is among [`Block::objects`] at `place`.
@@ -83,104 +97,121 @@ impl Block {
         Member { object: &self.objects[place], place }
     }
 
-    /// Whether it is one object, whose box the block's is: there is no need to look further.
+    /// Whether it is one object, whose extent the block's is: there is no need to look further.
     fn is_single(&self) -> bool {
         self.ids.len() == 1
     }
 
-    /// Whether the box of any of its objects overlaps `bounds`.
-    pub(crate) fn reaches(&self, simd: Simd, bounds: &Bounds) -> bool {
+    /// Whether the extent of any of its objects overlaps this one.
+    pub(crate) fn reaches(&self, simd: Simd, extent: &Extent) -> bool {
         if self.is_single() {
-            return self.bounds.overlaps(bounds);
+            return self.extent.overlaps(extent);
         }
-        simd.run(Reaches { boxes: &self.boxes, bounds })
+        simd.run(Reaches { extents: &self.extents, extent })
     }
 
-    /// Adds the places of each of its objects and one of `other`'s whose boxes overlap.
+    /// Adds the places of each of its objects and one of `other`'s whose extents overlap.
     pub(crate) fn overlaps(&self, simd: Simd, other: &Self, found: &mut Vec<[usize; 2]>) {
         if self.is_single() && other.is_single() {
-            found.extend(self.bounds.overlaps(&other.bounds).then_some([0, 0]));
+            found.extend(self.extent.overlaps(&other.extent).then_some([0, 0]));
         } else {
             simd.run(Overlaps { few: self, many: other, found });
         }
     }
 
-    /// Adds the places of every two of its objects whose boxes overlap.
+    /// Adds the places of every two of its objects whose extents overlap.
     pub(crate) fn overlaps_within(&self, simd: Simd, found: &mut Vec<[usize; 2]>) {
-        simd.run(OverlapsWithin { boxes: &self.boxes, found });
+        simd.run(OverlapsWithin { extents: &self.extents, found });
     }
 }
 
-/// Bounding boxes in whole lanes, padded with what is no box.
+/// Extents in whole lanes, padded with what is none.
 #[derive(Default)]
-pub(crate) struct Boxes {
-    chunks: Vec<BoxLanes>,
+pub(crate) struct Extents {
+    chunks: Vec<ExtentLanes>,
     len: usize,
 }
 
-/// The least and the greatest coordinates of as many boxes as there are lanes.
+/// Boxes and spheres of as many objects as there are lanes.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
-struct BoxLanes {
+struct ExtentLanes {
     min: [Lanes; 3],
     max: [Lanes; 3],
+    center: [Lanes; 3],
+    radius: Lanes,
 }
 
-impl BoxLanes {
+impl ExtentLanes {
     /// NaNs, which no box overlaps: one without end would overlap the empty one.
-    const NONE: Self = Self { min: [[f32::NAN; LANES]; 3], max: [[f32::NAN; LANES]; 3] };
+    const NONE: Self = {
+        let none = [f32::NAN; LANES];
+        Self { min: [none; 3], max: [none; 3], center: [none; 3], radius: none }
+    };
 
-    /// Which boxes overlap the one from `min` to `max`.
+    /// Which extents overlap this one; as [`Extent::overlaps`].
     #[inline(always)]
-    fn hits<I: Isa>(&self, isa: I, [min, max]: [[f32; 3]; 2]) -> LaneSet {
+    fn hits<I: Isa>(&self, isa: I, one: &Extent) -> LaneSet {
         let mut hits = LaneSet::MAX;
         for axis in 0..3 {
-            hits &= isa.at_most(isa.load(&self.min[axis]), isa.splat(max[axis]));
-            hits &= isa.at_most(isa.splat(min[axis]), isa.load(&self.max[axis]));
+            hits &= isa.at_most(isa.load(&self.min[axis]), isa.splat(one.bounds.max[axis]));
+            hits &= isa.at_most(isa.splat(one.bounds.min[axis]), isa.load(&self.max[axis]));
         }
-        hits
+        if hits == 0 {
+            return hits;
+        }
+        // Most boxes that overlap do so at a corner, where the spheres in them do not.
+        let mut square = isa.splat(0.0);
+        for axis in 0..3 {
+            let way = isa.sub(isa.load(&self.center[axis]), isa.splat(one.center[axis]));
+            square = isa.add(square, isa.mul(way, way));
+        }
+        let radii = isa.add(isa.load(&self.radius), isa.splat(one.radius));
+        let reach = isa.mul(radii, isa.splat(ROUNDING_MARGIN));
+        hits & isa.at_most(square, isa.mul(reach, reach))
     }
 }
 
-impl Boxes {
-    /// Makes room for so many boxes; if there were as many before, they stay.
+impl Extents {
+    /// Makes room for so many extents; if there were as many before, they stay.
     fn resize(&mut self, len: usize) {
         if self.len != len {
             self.chunks.clear();
-            self.chunks.resize(len.div_ceil(LANES), BoxLanes::NONE);
+            self.chunks.resize(len.div_ceil(LANES), ExtentLanes::NONE);
             self.len = len;
         }
     }
 
-    /// Makes room for so many boxes in all.
+    /// Makes room for so many extents in all.
     fn reserve(&mut self, len: usize) {
         self.chunks.reserve(len.div_ceil(LANES).saturating_sub(self.chunks.len()));
     }
 
-    fn set(&mut self, place: usize, bounds: &Bounds) {
-        let (BoxLanes { min, max }, lane) = (&mut self.chunks[place / LANES], place % LANES);
+    fn set(&mut self, place: usize, extent: &Extent) {
+        let (chunk, lane) = (&mut self.chunks[place / LANES], place % LANES);
         for axis in 0..3 {
-            min[axis][lane] = bounds.min[axis];
-            max[axis][lane] = bounds.max[axis];
+            chunk.min[axis][lane] = extent.bounds.min[axis];
+            chunk.max[axis][lane] = extent.bounds.max[axis];
+            chunk.center[axis][lane] = extent.center[axis];
+        }
+        chunk.radius[lane] = extent.radius;
+    }
+
+    /// The extent at `place`.
+    #[inline(always)]
+    fn at(&self, place: usize) -> Extent {
+        let (chunk, lane) = (&self.chunks[place / LANES], place % LANES);
+        let vector = |lanes: &[Lanes; 3]| Vec3::new(lanes[0][lane], lanes[1][lane], lanes[2][lane]);
+        Extent {
+            center: vector(&chunk.center),
+            radius: chunk.radius[lane],
+            ..Extent::of_box(Bounds { min: vector(&chunk.min), max: vector(&chunk.max) })
         }
     }
 
-    /// The box at `place`.
+    /// Adds `place` with the places of all that overlap the extent `one`.
     #[inline(always)]
-    fn at(&self, place: usize) -> [[f32; 3]; 2] {
-        let (BoxLanes { min, max }, lane) = (&self.chunks[place / LANES], place % LANES);
-        [min, max].map(|bounds| bounds.each_ref().map(|lanes| lanes[lane]))
-    }
-
-    /// Adds `place` with the places of all that overlap the box `one`.
-    #[inline(always)]
-    fn overlaps<I: Isa>(
-        &self,
-        isa: I,
-        place: usize,
-        one: [[f32; 3]; 2],
-        found: &mut Vec<[usize; 2]>,
-    ) {
+    fn overlaps<I: Isa>(&self, isa: I, place: usize, one: &Extent, found: &mut Vec<[usize; 2]>) {
         for (index, chunk) in self.chunks.iter().enumerate() {
             let others = lanes(chunk.hits(isa, one));
             found.extend(others.map(|lane| [place, index * LANES + lane]));
@@ -188,10 +219,10 @@ impl Boxes {
     }
 }
 
-/// The test whether any box overlaps one.
+/// The test whether any extent overlaps one.
 struct Reaches<'a> {
-    boxes: &'a Boxes,
-    bounds: &'a Bounds,
+    extents: &'a Extents,
+    extent: &'a Extent,
 }
 
 impl Kernel for Reaches<'_> {
@@ -199,12 +230,11 @@ impl Kernel for Reaches<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> bool {
-        let bounds = self.bounds.corners();
-        self.boxes.chunks.iter().any(|chunk| chunk.hits(isa, bounds) != 0)
+        self.extents.chunks.iter().any(|chunk| chunk.hits(isa, self.extent) != 0)
     }
 }
 
-/// The search for overlaps of the boxes of two blocks.
+/// The search for overlaps of the extents of two blocks.
 struct Overlaps<'a> {
     few: &'a Block,
     many: &'a Block,
@@ -218,21 +248,20 @@ impl Kernel for Overlaps<'_> {
     fn run<I: Isa>(self, isa: I) {
         let Self { few, many, found } = self;
         if few.is_single() {
-            many.boxes.overlaps(isa, 0, few.bounds.corners(), found);
+            many.extents.overlaps(isa, 0, &few.extent, found);
             return;
         }
-        let around = many.bounds.corners();
-        for (index, chunk) in few.boxes.chunks.iter().enumerate() {
-            for place in lanes(chunk.hits(isa, around)).map(|lane| index * LANES + lane) {
-                many.boxes.overlaps(isa, place, few.boxes.at(place), found);
+        for (index, chunk) in few.extents.chunks.iter().enumerate() {
+            for place in lanes(chunk.hits(isa, &many.extent)).map(|lane| index * LANES + lane) {
+                many.extents.overlaps(isa, place, &few.extents.at(place), found);
             }
         }
     }
 }
 
-/// The search for overlaps of the boxes of one block.
+/// The search for overlaps of the extents of one block.
 struct OverlapsWithin<'a> {
-    boxes: &'a Boxes,
+    extents: &'a Extents,
     found: &'a mut Vec<[usize; 2]>,
 }
 
@@ -241,15 +270,15 @@ impl Kernel for OverlapsWithin<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        let Self { boxes, found } = self;
-        for place in 0..boxes.len {
-            let one = boxes.at(place);
+        let Self { extents, found } = self;
+        for place in 0..extents.len {
+            let one = extents.at(place);
             // Each pair once: with those after it.
             let first = place + 1;
-            for (index, chunk) in boxes.chunks.iter().enumerate().skip(first / LANES) {
+            for (index, chunk) in extents.chunks.iter().enumerate().skip(first / LANES) {
                 let start = index * LANES;
                 let later = !first_lanes(first.saturating_sub(start));
-                let others = lanes(chunk.hits(isa, one) & later);
+                let others = lanes(chunk.hits(isa, &one) & later);
                 found.extend(others.map(|lane| [place, start + lane]));
             }
         }
@@ -258,7 +287,6 @@ impl Kernel for OverlapsWithin<'_> {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
     use proptest::collection::vec;
     use proptest::prelude::*;
 
@@ -266,7 +294,6 @@ mod tests {
 
     /// A box somewhere, or that of a solitary object, or a wall's, or one without end.
     fn any_box() -> impl Strategy<Value = Bounds> {
-        let place = || [-1.0_f32..1.0, -1.0..1.0, -1.0..1.0].prop_map(Vec3::from_array);
         prop_oneof![
             8 => (place(), place())
                 .prop_map(|(min, size)| Bounds { min, max: min + 0.5 * size.abs() }),
@@ -276,24 +303,38 @@ mod tests {
         ]
     }
 
-    /// One box, which is treated for itself, or fewer than `end`.
-    fn boxes(end: usize) -> impl Strategy<Value = Vec<Bounds>> {
-        prop_oneof![vec(any_box(), 1), vec(any_box(), 0..end)]
+    fn place() -> impl Strategy<Value = Vec3> {
+        [-1.0_f32..1.0, -1.0..1.0, -1.0..1.0].prop_map(Vec3::from_array)
     }
 
-    /// A block of which only the boxes are looked at.
-    fn block(all: &[Bounds]) -> Block {
+    /// A box, and for some a sphere somewhere.
+    fn any_extent() -> impl Strategy<Value = Extent> {
+        let radius = prop_oneof![0.0..1.0_f32, Just(f32::INFINITY)];
+        (any_box(), place(), radius).prop_map(|(bounds, center, radius)| Extent {
+            center,
+            radius,
+            ..Extent::of_box(bounds)
+        })
+    }
+
+    /// One extent, which is treated for itself, or fewer than `end`.
+    fn extents(end: usize) -> impl Strategy<Value = Vec<Extent>> {
+        prop_oneof![vec(any_extent(), 1), vec(any_extent(), 0..end)]
+    }
+
+    /// A block of which only the extents are looked at.
+    fn block(all: &[Extent]) -> Block {
         let mut block = Block::default();
         block.ids.extend((0..all.len() as u32).map(ObjectId));
-        block.boxes.resize(all.len());
-        all.iter().enumerate().for_each(|(place, own)| block.boxes.set(place, own));
-        block.bounds = all.iter().fold(Bounds::EMPTY, |whole, own| whole.union(own));
+        block.extents.resize(all.len());
+        all.iter().enumerate().for_each(|(place, own)| block.extents.set(place, own));
+        block.enclose(all.iter().fold(Bounds::EMPTY, |whole, own| whole.union(&own.bounds)));
         block
     }
 
     proptest! {
         #[test]
-        fn every_overlap_is_found_once(few in boxes(20), many in boxes(40)) {
+        fn every_overlap_is_found_once(few in extents(20), many in extents(40)) {
             let pairs = |one: usize, others: std::ops::Range<usize>| others.map(move |other| [one, other]);
             let between: Vec<[usize; 2]> = (0..few.len())
                 .flat_map(|one| pairs(one, 0..many.len()))
@@ -303,7 +344,7 @@ mod tests {
                 .flat_map(|one| pairs(one, one + 1..many.len()))
                 .filter(|&[one, other]| many[one].overlaps(&many[other]))
                 .collect();
-            let around = block(&many).bounds();
+            let around = *block(&many).extent();
             let reaches = few.iter().any(|own| own.overlaps(&around));
             for simd in Simd::available() {
                 let (mut found, mut found_within) = (Vec::new(), Vec::new());

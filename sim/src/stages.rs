@@ -26,7 +26,7 @@ const FRAMES_PER_TIMING: u64 = 16;
 /// What the interaction stage counted. Independent of blocking and executor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PairCount {
-    /// Pairs of objects with a rule whose boxes overlap.
+    /// Pairs of objects with a rule whose boxes and spheres overlap.
     pub candidates: u64,
     /// Those of them that touched.
     pub collisions: u64,
@@ -72,7 +72,7 @@ impl Stages {
         }
         // The box around walls says nothing, but each of them has one; and so has each object that is to
         // reach them.
-        a.reaches(self.simd, &b.bounds()) && b.reaches(self.simd, &a.bounds())
+        a.reaches(self.simd, b.extent()) && b.reaches(self.simd, a.extent())
     }
 
     /// Whether objects within one block may touch each other.

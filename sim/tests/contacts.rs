@@ -2,11 +2,13 @@
 
 mod common;
 
+use std::sync::Arc;
+
 use common::{no_rules, point, springs};
 use dualframe_sim::behavior::Scripted;
 use dualframe_sim::behavior::{Fixed, Keyframe};
 use dualframe_sim::block::Block;
-use dualframe_sim::geometry::{Geometry, Rigid};
+use dualframe_sim::geometry::{Geometry, Mesh, Rigid, Topology};
 use dualframe_sim::interaction::{
     Contact, ContactBuffer, Detection, InteractionPair, NodeSpheres, NodesInShape, Penalty,
     Scratch, Segment,
@@ -83,13 +85,22 @@ fn spheres_push_each_other_apart() {
 }
 
 #[test]
-fn boxes_may_overlap_without_contact() {
+fn boxes_and_spheres_may_overlap_without_contact() {
     let stages = stages(POINTS, POINTS, NodeSpheres::default());
-    let (segments, count) =
-        interact(&stages, point_at(0, Vec3::ZERO), point_at(1, Vec3::splat(0.15)));
-    assert_eq!((segments.len(), count), (0, PairCount { candidates: 1, collisions: 0 }));
-    let (segments, count) = interact(&stages, point_at(0, Vec3::ZERO), point_at(1, Vec3::X * 0.25));
-    assert_eq!((segments.len(), count), (0, PairCount::default()));
+    let rod = || {
+        let ends = [Vec3::X * -0.5, Vec3::X * 0.5];
+        let topology = Topology::new(&ends, Vec::new(), &[], false).expect("a topology");
+        let mesh = Mesh::new(Arc::new(topology), &ends, &[1.0; 2], 0.1).expect("a mesh");
+        Object::new(ObjectId(0), POINTS, Geometry::Mesh(mesh), springs(1.0))
+    };
+    let mut counts = Vec::new();
+    for place in [Vec3::Y * 0.15, Vec3::new(0.68, 0.15, 0.15), Vec3::X * 0.75] {
+        let (segments, count) = interact(&stages, rod(), point_at(1, place));
+        assert_eq!((segments.len(), count.collisions), (0, 0), "{place}");
+        counts.push(count.candidates);
+    }
+    // Both overlap; the boxes at a corner, where the spheres do not; neither.
+    assert_eq!(counts, [1, 0, 0]);
 }
 
 #[test]

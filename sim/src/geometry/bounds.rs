@@ -39,11 +39,6 @@ impl Bounds {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// Its least and its greatest coordinates.
-    pub(crate) fn corners(&self) -> [[f32; 3]; 2] {
-        [self.min.to_array(), self.max.to_array()]
-    }
-
     /// This box grown by `margin` metres on every side.
     #[must_use]
     pub fn inflated(&self, margin: f32) -> Self {

@@ -23,11 +23,41 @@ pub struct Extent {
     pub finite: bool,
 }
 
+/// Keeps rounding from hiding a touch that the distance would show: that of a sphere always, that of a box as far as
+/// coordinates of about the size of the bodies are rounded; usually 1.001. Far away, and where boxes are tested
+/// alone, a touch may be missed by as much as a coordinate is rounded.
+pub(crate) const ROUNDING_MARGIN: f32 = 1.001;
+
+impl Default for Extent {
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
 impl Extent {
+    /// Of nothing: it overlaps no other.
+    pub const EMPTY: Self =
+        Self { bounds: Bounds::EMPTY, center: Vec3::ZERO, radius: f32::INFINITY, finite: true };
+
+    /// Whether the objects in them may touch: the boxes share a point, and the spheres do so or miss each other by
+    /// less than a thousandth.
+    #[must_use]
+    #[inline]
+    pub fn overlaps(&self, other: &Self) -> bool {
+        let reach = (self.radius + other.radius) * ROUNDING_MARGIN;
+        self.bounds.overlaps(&other.bounds)
+            && self.center.distance_squared(other.center) <= reach * reach
+    }
+
+    /// Of whatever is in a box: nothing is known of a sphere.
+    pub(crate) fn of_box(bounds: Bounds) -> Self {
+        Self { bounds, ..Self::EMPTY }
+    }
+
     /// Of a geometry whose numbers are finite or not. Finite numbers may still be too large for a box.
     pub(super) fn new(bounds: Bounds, center: Vec3, finite: bool) -> Self {
         let boxed = bounds.is_finite() || bounds == Bounds::EMPTY;
-        Self { bounds, center, radius: f32::INFINITY, finite: finite && boxed }
+        Self { center, finite: finite && boxed, ..Self::of_box(bounds) }
     }
 }
 

@@ -16,6 +16,7 @@ pub use bounds::Bounds;
 pub use cut::Blade;
 pub(crate) use cut::{Birth, CutNode, CutSurface, Sweep};
 pub use extent::Extent;
+pub(crate) use extent::ROUNDING_MARGIN;
 pub use icosphere::{ICOSPHERE_EDGES, ICOSPHERE_FACES, ICOSPHERE_NODES, icosphere};
 pub(crate) use mesh::KernelParts;
 pub use mesh::{Mesh, MeshError};

@@ -38,7 +38,8 @@ pub use touches::{Touch, Touches};
 
 /// Finds where two objects touch.
 pub trait Detection: Send + Sync {
-    /// Adds the places where the objects touch. What it finds may depend on the two objects only.
+    /// Adds the places where the objects touch. What it finds may depend on the two objects only. It is asked
+    /// about those whose [extents overlap](crate::geometry::Extent::overlaps).
     fn detect(&self, first: &Object, second: &Object, touches: &mut Touches);
 }
 
@@ -59,14 +60,14 @@ pub trait Response: Send + Sync {
 /// interaction need not allocate.
 const NODES: usize = 256;
 
-/// Pairs of objects whose boxes overlap, of two blocks or within one, for which there is room from the start,
+/// Pairs of objects whose extents overlap, of two blocks or within one, for which there is room from the start,
 /// likewise; usually 4,096, some twenty for each of two hundred objects.
 const PAIRS: usize = 4_096;
 
 /// Memory that the interactions of one worker use one after the other.
 #[derive(Debug)]
 pub struct Scratch {
-    /// The places of objects whose boxes overlap, while two blocks interact.
+    /// The places of objects whose extents overlap, while two blocks interact.
     pub(crate) pairs: Vec<[usize; 2]>,
     pub(crate) pair: PairScratch,
 }

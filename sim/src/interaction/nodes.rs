@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::Detection;
 use super::contact::Contact;
 use super::touches::{NearNodes, Touch, Touches};
-use crate::geometry::{Bounds, LANES, Mesh};
+use crate::geometry::{Bounds, LANES, Mesh, ROUNDING_MARGIN};
 use crate::object::Object;
 use crate::simd::{Isa, Kernel, lanes};
 
@@ -17,7 +17,7 @@ use crate::simd::{Isa, Kernel, lanes};
 /// overlap touch as whole bodies.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodeSpheres {
-    /// The radius of a body's core, in metres; 0 for none.
+    /// The radius of a body's core, in metres; 0 for none. A core that is larger than the body may go unnoticed.
     pub core_radius: f32,
 }
 
@@ -26,14 +26,7 @@ impl Detection for NodeSpheres {
         let (Some(a), Some(b)) = (first.geometry.as_mesh(), second.geometry.as_mesh()) else {
             return;
         };
-        let [here, there] = [first.center(), second.center()];
-        self.detect_cores(here, there, touches);
-        // Most boxes that overlap do so at a corner, where the spheres in them do not; and only now are nodes read,
-        // which may be in no cache of this core.
-        let reach = (first.radius() + second.radius()) * ROUNDING_MARGIN;
-        if here.distance_squared(there) > reach * reach {
-            return;
-        }
+        self.detect_cores(first.center(), second.center(), touches);
         let bounds = second.bounds().inflated(a.contact_radius());
         let simd = touches.simd;
         let (list, near) = touches.parts();
@@ -54,11 +47,6 @@ impl NodeSpheres {
         }
     }
 }
-
-/// Keeps rounding from hiding a touch that the distance would show: that of a sphere always, that of a box as far as
-/// coordinates of about the size of the bodies are rounded; usually 1.001. Far away, and where boxes are tested
-/// alone, a touch may be missed by as much as a coordinate is rounded.
-const ROUNDING_MARGIN: f32 = 1.001;
 
 /// The search for overlapping spheres of two meshes.
 struct Overlaps<'a> {

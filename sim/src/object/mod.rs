@@ -48,9 +48,7 @@ pub struct Object {
     solitary: bool,
     fixed: bool,
     quarantined: Option<Fault>,
-    bounds: Bounds,
-    center: Vec3,
-    radius: f32,
+    extent: Extent,
     /// What an update takes, in seconds, as its share of its block's last ones that were timed; 0 before
     /// the first.
     cost: f32,
@@ -79,9 +77,7 @@ impl Object {
             solitary: false,
             fixed: behavior.is_fixed(),
             quarantined: None,
-            bounds: Bounds::EMPTY,
-            center: Vec3::ZERO,
-            radius: 0.0,
+            extent: Extent::EMPTY,
             cost: 0.0,
             visual: VisualProperties::default(),
             drawing: Drawing::default(),
@@ -132,20 +128,20 @@ impl Object {
     /// The box around it after its last update; empty for an excluded object.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
-        self.bounds
+        self.extent.bounds
     }
 
     /// The middle of its geometry after its last update, in metres.
     #[must_use]
     pub fn center(&self) -> Vec3 {
-        self.center
+        self.extent.center
     }
 
     /// The radius of a sphere around [`Object::center`] that held all of a surface after its last update, contact
     /// spheres included, in metres; infinite for what is no surface.
     #[must_use]
     pub fn radius(&self) -> f32 {
-        self.radius
+        self.extent.radius
     }
 
     /// What an update takes, in seconds, as its share of its block's last ones that were timed; 0 before
@@ -163,15 +159,15 @@ impl Object {
             if self.cost > 0.0 { 0.5 * (self.cost + took.min(2.0 * self.cost)) } else { took };
     }
 
-    /// The box that interactions are to look at: empty for an object that has none.
-    pub(crate) fn interaction_bounds(&self) -> Bounds {
-        if self.solitary { Bounds::EMPTY } else { self.bounds }
+    /// The extent that interactions are to look at: empty for an object that has none.
+    pub(crate) fn interaction_extent(&self) -> Extent {
+        if self.solitary { Extent::EMPTY } else { self.extent }
     }
 
     /// Excludes it for good. The first fault counts.
     pub(crate) fn quarantine(&mut self, fault: Fault) {
         self.quarantined.get_or_insert(fault);
-        self.bounds = Bounds::EMPTY;
+        self.extent.bounds = Bounds::EMPTY;
     }
 
     /// Fits box and centre to a geometry that was changed from outside, and takes the object for scenery or not by
@@ -182,12 +178,11 @@ impl Object {
         self.fit(self.geometry.extent(Simd::detect()));
     }
 
-    fn fit(&mut self, Extent { bounds, center, radius, finite }: Extent) {
+    fn fit(&mut self, extent: Extent) {
         if self.quarantined.is_none() {
             // In a union a box of no meaning would make others of those before it.
-            self.bounds = if finite { bounds } else { Bounds::EMPTY };
-            self.center = center;
-            self.radius = radius;
+            let bounds = if extent.finite { extent.bounds } else { Bounds::EMPTY };
+            self.extent = Extent { bounds, ..extent };
         }
     }
 
@@ -232,9 +227,7 @@ impl Object {
             solitary: self.solitary,
             fixed: self.fixed,
             quarantined: self.quarantined,
-            bounds: self.bounds,
-            center: self.center,
-            radius: self.radius,
+            extent: self.extent,
             cost: self.cost,
             visual: self.visual,
             drawing: self.drawing,
@@ -252,9 +245,7 @@ impl Object {
         snapshot.fixed = self.fixed;
         snapshot.cost = self.cost;
         snapshot.quarantined = self.quarantined;
-        snapshot.bounds = self.bounds;
-        snapshot.center = self.center;
-        snapshot.radius = self.radius;
+        snapshot.extent = self.extent;
         snapshot.visual = self.visual;
         snapshot.drawing = self.drawing;
         match (&self.geometry, &mut snapshot.geometry) {
