@@ -82,7 +82,7 @@ fn a_hand_cuts_and_drills() {
 fn a_script_is_watched() {
     let desktop = Desktop::start();
     let args = ["--step", "incision", "--frames", "40"];
-    let report = desktop.open(&[&CRANIOTOMY[..], &args].concat()).end();
+    let report = desktop.watch(&[&CRANIOTOMY[..], &args].concat());
     let folder = tempfile::tempdir().expect("a temporary folder");
     let json = folder.path().join("report.json");
     let json = json.to_str().expect("a plain path");

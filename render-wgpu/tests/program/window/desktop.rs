@@ -99,15 +99,15 @@ impl Desktop {
         command
     }
 
+    /// Runs the program, which says that it has no window if that is so, to its end, and gives back what it reported.
+    pub(crate) fn watch(&self, args: &[&str]) -> Value {
+        // Who looks for a picture may come too late.
+        self.launch(args).end()
+    }
+
     /// Runs the program until there is something to be seen in its window.
     pub(crate) fn open(&self, args: &[&str]) -> Session<'_> {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let file = |name| File::create(folder.path().join(name)).expect("a file");
-        let report = folder.path().join("report.json");
-        let mut command = self.command(args);
-        command.arg("--json").arg(&report).stdout(file("stdout")).stderr(file("stderr"));
-        let child = command.spawn().expect("the program starts");
-        let mut session = Session { desktop: self, child, folder, window: x11rb::NONE };
+        let mut session = self.launch(args);
         session.window = wait_for("the window", || {
             session.check();
             self.window_called("dualframe")
@@ -115,6 +115,16 @@ impl Desktop {
         session.wait_for("a picture", Screenshot::is_drawn);
         self.focus(session.window);
         session
+    }
+
+    fn launch(&self, args: &[&str]) -> Session<'_> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let file = |name| File::create(folder.path().join(name)).expect("a file");
+        let report = folder.path().join("report.json");
+        let mut command = self.command(args);
+        command.arg("--json").arg(&report).stdout(file("stdout")).stderr(file("stderr"));
+        let child = command.spawn().expect("the program starts");
+        Session { desktop: self, child, folder, window: x11rb::NONE }
     }
 
     /// Gives a window the keyboard.
@@ -318,7 +328,7 @@ impl Session<'_> {
     }
 
     /// Waits for its end, which is to be a sound one, and gives back what it reported.
-    pub(crate) fn end(mut self) -> Value {
+    fn end(mut self) -> Value {
         let status = wait_for("the end", || self.child.try_wait().expect("it can be waited for"));
         let (printed, told) = (self.read("stdout"), self.read("stderr"));
         assert!(status.success() && told.is_empty(), "{status}: {told}");

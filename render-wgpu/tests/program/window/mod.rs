@@ -45,8 +45,7 @@ fn untouched(args: &[&str], frames: &Value) -> Value {
 fn watching_changes_nothing() {
     let desktop = Desktop::start();
     let args = ["--objects", "20", "--size", "640x480"];
-    let session = desktop.open(&[&args[..], &["--frames", "60", "--gravity"]].concat());
-    let report = session.end();
+    let report = desktop.watch(&[&args[..], &["--frames", "60", "--gravity"]].concat());
     assert_eq!(report["frames"], 60);
     let args = [&args[..], &["--gravity"]].concat();
     assert_eq!(report["state_hash"], untouched(&args, &report["frames"]));
