@@ -37,7 +37,7 @@ pub struct Phase {
 impl Phase {
     /// The gain below which a round is marked.
     pub const LEAST_GAIN: f64 = 1.9;
-    /// How many times the best ping-pong seen a round's may be.
+    /// How many times the [usual](Self::usual_ping_pong) ping-pong a round's may be.
     pub const WORST_PING_PONG: f64 = 3.0;
 
     /// The worse of two, in both respects.
@@ -46,10 +46,19 @@ impl Phase {
         Self { gain: self.gain.min(other.gain), ping_pong: self.ping_pong.max(other.ping_pong) }
     }
 
-    /// Whether a round in this phase is to be marked, if the best ping-pong took `best` nanoseconds.
+    /// What a ping-pong usually takes, in nanoseconds: the lower quartile of those of phases that gain enough.
+    /// The best of all would be that of two threads which the machine has put on one core: several times faster
+    /// than between two cores, and with less gained, mostly seen in the phase itself.
     #[must_use]
-    pub fn is_bad(self, best: f64) -> bool {
-        self.gain < Self::LEAST_GAIN || self.ping_pong > Self::WORST_PING_PONG * best
+    pub fn usual_ping_pong(phases: &[Self]) -> f64 {
+        let gaining = phases.iter().filter(|phase| phase.gain >= Self::LEAST_GAIN);
+        Quartiles::of(gaining.map(|phase| phase.ping_pong)).map_or(f64::INFINITY, |all| all.lower)
+    }
+
+    /// Whether a round in this phase is to be marked, if a ping-pong usually takes so many nanoseconds.
+    #[must_use]
+    pub fn is_bad(self, usual_ping_pong: f64) -> bool {
+        self.gain < Self::LEAST_GAIN || self.ping_pong > Self::WORST_PING_PONG * usual_ping_pong
     }
 }
 
@@ -163,6 +172,17 @@ mod tests {
         let spans = |spans: [[u64; 2]; 2]| together(spans[0].map(at), spans[1].map(at));
         assert_eq!(spans([[0, 3], [1, 3]]), 0.002, "on two cores, when the second one came");
         assert_eq!(spans([[0, 3], [1, 5]]), 0.004, "on one core, one after the other");
+    }
+
+    #[test]
+    fn two_threads_on_one_core_are_no_yardstick() {
+        let apart = [55.0, 56.0, 57.0, 58.0, 60.0].map(|ping_pong| Phase { gain: 1.95, ping_pong });
+        let together = [1.8, 1.3, 0.9].map(|gain| Phase { gain, ping_pong: 15.0 });
+        // Put there between the one measurement and the other.
+        let unnoticed = [Phase { gain: 1.95, ping_pong: 15.0 }];
+        let usual = Phase::usual_ping_pong(&[&apart[..], &together, &unnoticed].concat());
+        assert!((55.0..58.0).contains(&usual), "{usual} ns");
+        assert_eq!(Phase::usual_ping_pong(&together), f64::INFINITY);
     }
 
     #[test]

@@ -21,7 +21,7 @@ pub(super) fn page(machine: &Machine, plan: &Plan, reports: &[Report]) -> String
          <h1>dualframe: experiments</h1>\n\
          <p>{machine}; seed {seed}. Medians of interleaved rounds. A round is marked when two \
          independent threads gain less than 1.9 over one, or a ping-pong between them takes more \
-         than three times the best; marked rounds are in the CSV files. The paper's values are those \
+         than three times what is usual; marked rounds are in the CSV files. The paper's values are those \
          of a 6-core Intel i7-980X.</p>\n{body}</body>\n</html>\n"
     )
 }

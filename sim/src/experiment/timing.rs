@@ -44,8 +44,8 @@ pub enum Rounds {
 pub struct Series {
     labels: Vec<String>,
     rounds: Vec<Round>,
-    /// The best ping-pong of all phases, in nanoseconds: a round's is the worse of two.
-    best_ping_pong: f64,
+    /// [`Phase::usual_ping_pong`] of all phases, in nanoseconds: a round's is the worse of two.
+    usual_ping_pong: f64,
 }
 
 impl Series {
@@ -62,9 +62,8 @@ impl Series {
     ) -> Result<Self, ExperimentError> {
         let labels = contenders.iter().map(|contender| contender.label.clone()).collect();
         let count = contenders.len();
-        let mut before = phase();
-        let mut series =
-            Self { labels, rounds: Vec::with_capacity(rounds), best_ping_pong: before.ping_pong };
+        let mut phases = vec![phase()];
+        let mut measured = Vec::with_capacity(rounds);
         for round in 0..rounds {
             let mut seconds = vec![0.0; count];
             for turn in 0..count {
@@ -76,12 +75,12 @@ impl Series {
                 }
                 done();
             }
-            let after = phase();
-            series.rounds.push(Round { seconds, phase: before.worse(after) });
-            series.best_ping_pong = series.best_ping_pong.min(after.ping_pong);
-            before = after;
+            let (before, after) = (phases[round], phase());
+            measured.push(Round { seconds, phase: before.worse(after) });
+            phases.push(after);
         }
-        Ok(series)
+        let usual_ping_pong = Phase::usual_ping_pong(&phases);
+        Ok(Self { labels, rounds: measured, usual_ping_pong })
     }
 
     /// The contenders' labels.
@@ -99,7 +98,7 @@ impl Series {
     /// For each round, whether it fell into a bad phase.
     #[must_use]
     pub fn marks(&self) -> Vec<bool> {
-        self.rounds.iter().map(|round| round.phase.is_bad(self.best_ping_pong)).collect()
+        self.rounds.iter().map(|round| round.phase.is_bad(self.usual_ping_pong)).collect()
     }
 
     /// The number of rounds that fell into a bad phase.
