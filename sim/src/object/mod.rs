@@ -137,13 +137,6 @@ impl Object {
         self.extent.center
     }
 
-    /// The radius of a sphere around [`Object::center`] that held all of a surface after its last update, contact
-    /// spheres included, in metres; infinite for what is no surface.
-    #[must_use]
-    pub fn radius(&self) -> f32 {
-        self.extent.radius
-    }
-
     /// What an update takes, in seconds, as its share of its block's last ones that were timed; 0 before
     /// the first.
     #[must_use]
