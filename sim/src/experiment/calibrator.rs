@@ -1,15 +1,15 @@
 //! What the machine gives at the moment, measured beside each round.
 //!
 //! Other programs on a shared machine take time from some rounds and not from others. Two threads that
-//! share nothing show lost cores; a ping-pong between two threads shows slow communication, which the
-//! first do not notice.
+//! share nothing show lost cores, and two that are halves of one; a ping-pong between two threads shows slow
+//! communication, which the first do not notice.
 
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use super::statistics::Quartiles;
-use super::work::{seconds_of, spin, steps_per_second};
+use super::work::{divide, seconds_of, steps_per_second};
 
 /// Seconds of one repetition of the busy threads; usually 0.002, long against the time it takes to
 /// start them together and short against a round.
@@ -71,7 +71,7 @@ pub struct Calibrator {
 impl Default for Calibrator {
     /// A calibrator for this machine.
     fn default() -> Self {
-        Self { steps: (steps_per_second() * BUSY) as u64 }
+        Self { steps: (steps_per_second(divide) * BUSY) as u64 }
     }
 }
 
@@ -84,7 +84,8 @@ impl Calibrator {
 
     fn gain(&self) -> f64 {
         // The fastest: what one thread does when nothing disturbs it.
-        let alone = (0..REPETITIONS).map(|_| seconds_of(self.steps)).fold(f64::INFINITY, f64::min);
+        let alone =
+            (0..REPETITIONS).map(|_| seconds_of(divide, self.steps)).fold(f64::INFINITY, f64::min);
         let ready = AtomicUsize::new(0);
         let repeat = || -> Vec<[Instant; 2]> {
             let once = |repetition| {
@@ -94,7 +95,7 @@ impl Calibrator {
                 while ready.load(Ordering::Relaxed) < 2 * (repetition + 1) {
                     thread::yield_now();
                 }
-                spin(self.steps);
+                divide(self.steps);
                 [came, Instant::now()]
             };
             (0..REPETITIONS).map(once).collect()

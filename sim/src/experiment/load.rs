@@ -63,7 +63,7 @@ impl StandIn {
             frame = frame.min(serial_frame(subject)?);
         }
         let spinning = frame * RENDER_SHARE / (1.0 - RENDER_SHARE) / subject.objects() as f64;
-        Ok(Self { steps: (spinning * steps_per_second()) as u64 })
+        Ok(Self { steps: (spinning * steps_per_second(spin)) as u64 })
     }
 }
 

@@ -14,16 +14,32 @@ pub(super) fn spin(steps: u64) {
     black_box(state);
 }
 
-/// Steps of [`spin`] that one thread takes in a second.
-pub(super) fn steps_per_second() -> f64 {
-    const STEPS: u64 = 1_000_000;
-    let best = (0..5).map(|_| seconds_of(STEPS)).fold(f64::INFINITY, f64::min);
+/// Numbers that [`divide`] works on, enough of them that none waits for the one before.
+const NUMBERS: usize = 32;
+
+/// Takes so many steps that keep the units for division and square roots busy, as the kernels do. Two threads that the
+/// machine has put on one core get hardly more of it done than one; of [`spin`], whose steps wait for each other,
+/// they would get twice as much done even there.
+pub(super) fn divide(steps: u64) {
+    let mut numbers = black_box([1.0_f32; NUMBERS]);
+    for _ in 0..steps {
+        for number in &mut numbers {
+            *number = 2.0 / (1.0 + *number).sqrt();
+        }
+    }
+    black_box(numbers);
+}
+
+/// Steps of such work that one thread takes in a second.
+pub(super) fn steps_per_second(work: fn(u64)) -> f64 {
+    const STEPS: u64 = 300_000;
+    let best = (0..5).map(|_| seconds_of(work, STEPS)).fold(f64::INFINITY, f64::min);
     STEPS as f64 / best
 }
 
-/// Seconds that so many steps take now.
-pub(super) fn seconds_of(steps: u64) -> f64 {
+/// Seconds that so many steps of it take now.
+pub(super) fn seconds_of(work: fn(u64), steps: u64) -> f64 {
     let began = Instant::now();
-    spin(steps);
+    work(steps);
     began.elapsed().as_secs_f64()
 }
