@@ -30,6 +30,7 @@
 pub mod behavior;
 pub mod block;
 pub mod blocking;
+mod cost;
 pub mod device;
 pub mod executor;
 #[cfg(feature = "experiment")]

@@ -12,6 +12,7 @@ use glam::Vec3;
 
 use crate::behavior::{Input, SpringWork, Workspace, batch};
 use crate::block::Block;
+use crate::cost::is_timed;
 use crate::interaction::{
     ContactBuffer, ContactRecord, Member, PairScratch, Rules, Scratch, Segment,
 };
@@ -19,9 +20,6 @@ use crate::message::Message;
 use crate::object::{Drawing, Fault, FaultKind, Object, ObjectId};
 use crate::render::Renderer;
 use crate::simd::Simd;
-
-/// Of so many frames the updates of one are timed, for who balances them; usually 16.
-const FRAMES_PER_TIMING: u64 = 16;
 
 /// What the interaction stage counted. Independent of blocking and executor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -145,7 +143,7 @@ impl Stages {
         mail: impl Fn(ObjectId) -> M,
         post: &mut dyn FnMut(ObjectId, ObjectId, Message),
     ) {
-        let began = frame.is_multiple_of(FRAMES_PER_TIMING).then(Instant::now);
+        let began = is_timed(frame).then(Instant::now);
         let Workspace { received: memory, springs } = workspace;
         let mut received = mem::take(memory);
         received.extend(block, results);

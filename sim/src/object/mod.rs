@@ -10,6 +10,7 @@ use std::time::Duration;
 use glam::Vec3;
 
 use crate::behavior::{Behavior, Fixed};
+use crate::cost::Cost;
 use crate::geometry::{Bounds, Extent, Geometry};
 use crate::message::Message;
 use crate::simd::Simd;
@@ -49,9 +50,8 @@ pub struct Object {
     fixed: bool,
     quarantined: Option<Fault>,
     extent: Extent,
-    /// What an update takes, in seconds, as its share of its block's last ones that were timed; 0 before
-    /// the first.
-    cost: f32,
+    /// What an update takes, as its share of its block's.
+    cost: Cost,
     /// What it looks like.
     pub visual: VisualProperties,
     /// How it is drawn.
@@ -78,7 +78,7 @@ impl Object {
             fixed: behavior.is_fixed(),
             quarantined: None,
             extent: Extent::EMPTY,
-            cost: 0.0,
+            cost: Cost::default(),
             visual: VisualProperties::default(),
             drawing: Drawing::default(),
             geometry,
@@ -141,15 +141,12 @@ impl Object {
     /// the first.
     #[must_use]
     pub fn cost(&self) -> f32 {
-        self.cost
+        self.cost.seconds()
     }
 
     /// Notes what an update took.
     pub(crate) fn note_cost(&mut self, took: Duration) {
-        let took = took.as_secs_f32();
-        // An update that was interrupted is not to count for many times what it is.
-        self.cost =
-            if self.cost > 0.0 { 0.5 * (self.cost + took.min(2.0 * self.cost)) } else { took };
+        self.cost.note(took);
     }
 
     /// The extent that interactions are to look at: empty for an object that has none.

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use dualframe_core::contacts::Contacts;
 use dualframe_core::environment::{Environment, Pair};
@@ -15,6 +15,7 @@ use dualframe_core::unit::UnitId;
 use super::overflow::Overflow;
 use crate::behavior::{Room, Workspace};
 use crate::block::Block;
+use crate::cost::{Cost, is_timed};
 use crate::executor::FrameRecord;
 use crate::executor::outside::Outside;
 use crate::interaction::{ContactBuffer, ContactRecord, Scratch};
@@ -155,8 +156,29 @@ pub(super) struct Screen<'s> {
     pub(super) on_frame: &'s mut dyn FnMut(&FrameRecord),
     /// What was counted in the frame being rendered.
     pub(super) pairs: PairCount,
+    /// What rendering took of that frame so far, if it is timed.
+    pub(super) took: Duration,
+    /// What it takes in a frame.
+    pub(super) rendering: &'s mut Cost,
     /// Counts the frames that are done.
     pub(super) frame: &'s mut u64,
+}
+
+impl Screen<'_> {
+    /// Lets the renderer work for a frame.
+    #[inline]
+    fn show(&mut self, frame: u64, work: impl FnOnce(&mut dyn Renderer)) {
+        let began = is_timed(frame).then(Instant::now);
+        work(self.renderer);
+        self.took += began.map_or(Duration::ZERO, |began| began.elapsed());
+    }
+
+    /// Notes what a frame's rendering took, once it is swapped.
+    fn note(&mut self, frame: u64) {
+        if is_timed(frame) {
+            self.rendering.note(std::mem::take(&mut self.took));
+        }
+    }
 }
 
 impl<'s> Environment for Host<'s> {
@@ -244,18 +266,20 @@ impl<'s> Environment for Host<'s> {
     fn render(
         &self,
         _: UnitId,
-        _: Frame,
+        frame: Frame,
         unit: &Unit,
         screen: &mut Screen<'s>,
     ) -> Result<(), TableFull> {
         screen.pairs += unit.pairs;
-        self.shared.stages.render(&unit.block, screen.renderer);
+        let draw = |renderer: &mut dyn Renderer| self.shared.stages.render(&unit.block, renderer);
+        screen.show(self.shared.number(frame), draw);
         Ok(())
     }
 
     fn swap(&self, frame: Frame, screen: &mut Screen<'s>) -> Result<(), TableFull> {
         let number = self.shared.number(frame);
-        screen.renderer.swap(number);
+        screen.show(number, |renderer| renderer.swap(number));
+        screen.note(number);
         let pairs = std::mem::take(&mut screen.pairs);
         (screen.on_frame)(&FrameRecord { frame: number, swapped: Instant::now(), pairs });
         self.shared.outside.swapped(number);

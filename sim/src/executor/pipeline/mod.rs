@@ -15,7 +15,7 @@ mod team;
 
 use std::panic::resume_unwind;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use dualframe_core::error::TableFull;
 use dualframe_core::inbox::From;
@@ -34,6 +34,7 @@ use super::{Executor, ExecutorError, FrameRecord, StageSeconds, world};
 use crate::behavior::Room;
 use crate::block::Block;
 use crate::blocking::{Blocking, Grain};
+use crate::cost::Cost;
 use crate::mailbox::Mailbox;
 use crate::message::Letter;
 use crate::object::{Object, ObjectId};
@@ -57,6 +58,8 @@ pub struct PipelineExecutor {
     pool: Arc<Pool>,
     team: Team,
     frame: u64,
+    /// What rendering takes in a frame.
+    rendering: Cost,
     /// Objects' messages for the next frame.
     mail: Vec<(From, Parcel)>,
     outside: Outside,
@@ -82,8 +85,7 @@ impl PipelineExecutor {
         let homes = pool.threads().min(MOST_HOMES);
         if grain == Grain::Spatial {
             blocks.iter_mut().for_each(|block| blocking.drain(block));
-            blocking.split();
-            blocking.deal(homes as u32);
+            blocking.deal(homes as u32, 0.0);
             for (index, block) in blocks.iter_mut().enumerate() {
                 blocking.fill(index, block);
             }
@@ -109,6 +111,7 @@ impl PipelineExecutor {
             pool,
             team: Team::default(),
             frame,
+            rendering: Cost::default(),
             mail,
             outside,
             times: Vec::new(),
@@ -161,8 +164,14 @@ impl PipelineExecutor {
             homes: self.config.homes,
             limits,
         };
-        let (frame, pairs) = (&mut self.frame, PairCount::default());
-        let screen = Screen { renderer, on_frame, pairs, frame };
+        let screen = Screen {
+            renderer,
+            on_frame,
+            pairs: PairCount::default(),
+            took: Duration::ZERO,
+            rendering: &mut self.rendering,
+            frame: &mut self.frame,
+        };
         let ended = context.run(frames, pipeline, regrouping, screen);
         let report = report.into_inner().unwrap_or_else(PoisonError::into_inner);
         self.tables.unload(&mut self.blocks);

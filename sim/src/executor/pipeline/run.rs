@@ -15,6 +15,7 @@ use super::host::{Host, Parcel, Screen, Shared};
 use super::memory::Limits;
 use super::team::Team;
 use crate::blocking::{Blocking, FRAMES_PER_BLOCKING, Grain};
+use crate::cost::Cost;
 use crate::executor::world;
 use crate::pool::{Crew, Pool};
 use crate::timeline::Timeline;
@@ -86,7 +87,8 @@ impl Regrouping<'_> {
         }
     }
 
-    /// Forms the blocks anew from where their objects are, if that is due before a frame.
+    /// Forms the blocks anew from where their objects are, if that is due before a frame. `rendering` is what
+    /// that takes in a frame.
     ///
     /// # Errors
     /// How many of them may meet, if the table of those that do is to grow first.
@@ -95,13 +97,14 @@ impl Regrouping<'_> {
         frame: u64,
         shared: &Shared<'_>,
         pipeline: &mut SimPipeline<'_, '_>,
+        rendering: Cost,
     ) -> Result<(), usize> {
         let due =
             self.blocking.as_deref_mut().filter(|_| world::regroups_before(Grain::Spatial, frame));
         let Some(blocking) = due else { return Ok(()) };
         pipeline.objects_mut().for_each(|unit| blocking.drain(&mut unit.block));
-        blocking.split();
-        blocking.deal(self.homes);
+        // Home 0 is the calling thread's, which renders.
+        blocking.deal(self.homes, rendering.seconds());
         for (index, unit) in pipeline.objects_mut().enumerate() {
             blocking.fill(index, &mut unit.block);
             shared.register.locate(index, &unit.block);
@@ -182,7 +185,9 @@ impl<'s> Context<'s, '_> {
             let frame = self.shared.first_frame + done;
             let batch = (FRAMES_PER_BLOCKING - frame % FRAMES_PER_BLOCKING).min(frames - done);
             let Ok(mut resting) = pipeline.write() else { break };
-            if let Err(pairs) = regrouping.regroup_before(frame, self.shared, &mut resting) {
+            if let Err(pairs) =
+                regrouping.regroup_before(frame, self.shared, &mut resting, *screen.rendering)
+            {
                 end = End::Outgrown(Table::Interactions, pairs);
                 break;
             }

@@ -1,8 +1,10 @@
-//! How objects are grouped into blocks: by recursive median splits of their positions.
+//! How objects are grouped into blocks, and blocks shared out to homes: by recursive splits of their positions.
 
-use std::cmp::Reverse;
+mod split;
 
 use thiserror::Error;
+
+use self::split::{Key, Members};
 
 use crate::block::Block;
 use crate::object::Object;
@@ -53,9 +55,11 @@ const BLOCKS: f64 = 0.1;
 const FEWEST_PER_WORKER: usize = 2;
 /// So many share out better, if each has [`FILLING`] objects.
 const USUAL_PER_WORKER: usize = 4;
-/// Objects of a block that leave few of its lanes empty, however uneven they are; usually 60, twice as many as
-/// are advanced side by side.
-const FILLING: usize = 60;
+/// Objects of a block that leave few of its lanes empty, however uneven they are; usually 70, a few more than twice as
+/// many as are advanced side by side.
+const FILLING: usize = 70;
+/// How much larger than others the blocks of a home may usually be that is to have more objects; twice.
+const UNEVENNESS: usize = 2;
 
 /// Groups objects into a number of blocks that stays the same; which objects are together changes.
 ///
@@ -71,35 +75,8 @@ pub struct Blocking {
     moving_blocks: usize,
     /// Moving objects are shared out so many at a time: as many as are advanced side by side, or one by one.
     share: usize,
-    /// Room for objects in every block of moving ones: which of them has a share more changes.
+    /// Room for objects in every block of moving ones: how many each has changes.
     room: usize,
-}
-
-/// Who is in a block.
-#[derive(Default)]
-struct Members {
-    ids: Vec<u32>,
-    /// What their updates take, in seconds, as far as it is known.
-    cost: f32,
-    home: u32,
-    /// The place among the blocks as they were split: close in space are close in number.
-    place: usize,
-}
-
-impl Members {
-    /// By home; there by the power of two of their cost, the dearest first; there by place, for neighbours
-    /// that come one after the other meet in the cache.
-    fn order(&self) -> (u32, Reverse<i32>, usize) {
-        (self.home, Reverse(self.cost.log2() as i32), self.place)
-    }
-}
-
-/// Where an object is, and what its update takes.
-#[derive(Clone, Copy)]
-struct Key {
-    center: [f32; 3],
-    id: u32,
-    cost: f32,
 }
 
 impl Blocking {
@@ -153,14 +130,14 @@ impl Blocking {
             ),
         };
         let share = if moving_blocks == moving.len() { 1 } else { HALF };
-        let room = moving.len().div_ceil(share).div_ceil(moving_blocks.max(1)) * share;
-        let empty = || Members { ids: Vec::with_capacity(room), ..Members::default() };
+        let room = UNEVENNESS * moving.len().div_ceil(share).div_ceil(moving_blocks.max(1)) * share;
+        let empty = || Members::of(Vec::with_capacity(room));
         let mut members = Vec::new();
         members.resize_with(moving_blocks, empty);
         for (ids, blocks) in [(scenery, scenery_blocks), (solitary, solitary_blocks)] {
             let size = ids.len().div_ceil(blocks.max(1)).max(1);
             let chunks = ids.chunks(size);
-            members.extend(chunks.map(|ids| Members { ids: ids.to_vec(), ..Members::default() }));
+            members.extend(chunks.map(|ids| Members::of(ids.to_vec())));
         }
         let mut blocks = Vec::new();
         blocks.resize_with(members.len(), Block::default);
@@ -182,32 +159,28 @@ impl Blocking {
         }
     }
 
-    /// Decides, when all blocks are drained, which objects go where.
+    /// Decides, when all blocks are drained, which objects go where: as many to each.
     pub fn split(&mut self) {
+        self.list();
+        split::evenly(&mut self.keys, &mut self.members[..self.moving_blocks], 0, self.share);
+    }
+
+    /// The same for so many homes, which get as much of the work as makes them take equally long, as far as that is
+    /// known. Who works at home 0 does something else too, for `besides` seconds a frame. Blocks of one home are close
+    /// in space, and each has its longest blocks first, so that none of its last is long.
+    pub fn deal(&mut self, homes: u32, besides: f32) {
+        self.list();
+        let members = &mut self.members[..self.moving_blocks];
+        split::among_homes(&mut self.keys, members, 0..homes.max(1), self.share, besides);
+        members.iter_mut().enumerate().for_each(|(place, members)| members.place = place);
+        members.sort_unstable_by_key(Members::order);
+    }
+
+    /// Lists where the objects are.
+    fn list(&mut self) {
         self.keys.clear();
         let object = |&id: &u32| self.objects.get(id as usize)?.as_ref();
         self.keys.extend(self.moving.iter().filter_map(object).map(Key::new));
-        split(&mut self.keys, &mut self.members[..self.moving_blocks], self.share);
-    }
-
-    /// Shares the moving objects' blocks out to so many homes, for a [`split`](Self::split) that is to be
-    /// worked on from there: blocks of one home are close in space, homes take equally long as far as
-    /// that is known, and each has its longest blocks first, so that none of its last is long.
-    pub fn deal(&mut self, homes: u32) {
-        let moving = &mut self.members[..self.moving_blocks];
-        let total: f32 = moving.iter().map(|members| members.cost).sum();
-        let mut before = 0.0;
-        for (index, members) in moving.iter_mut().enumerate() {
-            let middle = if total > 0.0 {
-                (before + 0.5 * members.cost) / total
-            } else {
-                (index as f32 + 0.5) / self.moving_blocks as f32
-            };
-            members.home = ((middle * homes as f32) as u32).min(homes.saturating_sub(1));
-            before += members.cost;
-            members.place = index;
-        }
-        moving.sort_unstable_by_key(Members::order);
     }
 
     /// The home of the block number `index`; 0 without such a block, and for those that never move.
@@ -251,61 +224,18 @@ fn block_count(objects: usize, workers: usize) -> usize {
     wanted.min(objects.div_ceil(HALF))
 }
 
-impl Key {
-    fn new(object: &Object) -> Self {
-        Self { center: object.center().to_array(), id: object.id().0, cost: object.cost() }
-    }
-}
-
-/// Shares the objects out evenly, `share` at a time: halves along the longest side until each part is one block.
-/// Every block gets a share; the last may be short of objects.
-fn split(keys: &mut [Key], members: &mut [Members], share: usize) {
-    match members {
-        [] => {}
-        [only] => {
-            only.ids.clear();
-            only.ids.extend(keys.iter().map(|key| key.id));
-            only.ids.sort_unstable();
-            only.cost = keys.iter().map(|key| key.cost).sum();
-        }
-        _ => {
-            let half = members.len() / 2;
-            let middle = keys.len().div_ceil(share) * half / members.len() * share;
-            // Blocks that were not drained leave fewer objects than there is room for.
-            if middle < keys.len() {
-                let axis = longest_side(keys);
-                keys.select_nth_unstable_by(middle, |a, b| {
-                    a.center[axis].total_cmp(&b.center[axis]).then(a.id.cmp(&b.id))
-                });
-            }
-            let (low, high) = keys.split_at_mut(middle);
-            let (low_members, high_members) = members.split_at_mut(half);
-            split(low, low_members, share);
-            split(high, high_members, share);
-        }
-    }
-}
-
-fn longest_side(keys: &[Key]) -> usize {
-    let side = |axis: usize| {
-        let values = keys.iter().map(|key| key.center[axis]);
-        let (low, high) = values
-            .fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), value| (l.min(value), h.max(value)));
-        high - low
-    };
-    let sides = [side(0), side(1), side(2)];
-    (1..3).fold(0, |longest, axis| if sides[axis] > sides[longest] { axis } else { longest })
-}
-
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
 
+    use proptest::prelude::*;
+
     use super::*;
     use crate::scene::ParticleScene;
 
-    /// Deals particles whose updates take so many microseconds; what each home is given, block by block.
-    fn dealt(micros: &[u64], homes: u32) -> Vec<Vec<u64>> {
+    /// Deals particles whose updates take so many microseconds, for two workers; for each home what its blocks' updates
+    /// take, and how many objects they have.
+    fn dealt(micros: &[u64], homes: u32, besides: u64) -> Vec<Vec<(u64, usize)>> {
         let scene = ParticleScene::new(micros.len()).build().expect("a valid scene");
         let mut objects = scene.objects;
         for (object, &micros) in objects.iter_mut().zip(micros) {
@@ -314,19 +244,20 @@ mod tests {
         let (mut blocking, mut blocks) =
             Blocking::new(objects, Grain::Spatial, 2).expect("a valid environment");
         blocks.iter_mut().for_each(|block| blocking.drain(block));
-        blocking.split();
-        blocking.deal(homes);
+        blocking.deal(homes, Duration::from_micros(besides).as_secs_f32());
         let mut given = vec![Vec::new(); homes as usize];
-        for (index, block) in blocks.iter_mut().enumerate() {
+        for (index, block) in blocks.iter_mut().enumerate().take(blocking.moving_blocks) {
             blocking.fill(index, block);
             let cost = |object: &Object| (object.cost() * 1e6).round() as u64;
-            let moving = block.objects().iter().filter(|object| kind(object) == 0);
-            let cost: u64 = moving.map(cost).sum();
-            if cost > 0 {
-                given[blocking.home(index) as usize].push(cost);
-            }
+            let objects = block.objects();
+            given[blocking.home(index) as usize]
+                .push((objects.iter().map(cost).sum(), objects.len()));
         }
         given
+    }
+
+    fn cost(home: &[(u64, usize)]) -> u64 {
+        home.iter().map(|(cost, _)| cost).sum()
     }
 
     #[test]
@@ -334,12 +265,12 @@ mod tests {
         let micros: Vec<u64> = (1..=30).map(|object| object * object % 97 + 1).collect();
         let longest = 97;
         for homes in 1..=4 {
-            let given = dealt(&micros, homes);
+            let given = dealt(&micros, homes, 0);
             let share = micros.iter().sum::<u64>() / u64::from(homes);
             for home in &given {
-                let cost: u64 = home.iter().sum();
+                let cost = cost(home);
                 assert!(cost.abs_diff(share) <= longest, "{cost} of {share} µs, {homes} homes");
-                let halves = home.windows(2).filter(|pair| pair[1] >= 2 * pair[0]);
+                let halves = home.windows(2).filter(|pair| pair[1].0 >= 2 * pair[0].0);
                 assert_eq!(halves.count(), 0, "a long one after a short one: {home:?}");
             }
             assert_eq!(given.iter().map(Vec::len).sum::<usize>(), micros.len());
@@ -347,12 +278,49 @@ mod tests {
     }
 
     #[test]
-    fn an_interrupted_update_counts_at_most_double() {
-        let scene = ParticleScene::new(1).build().expect("a valid scene");
-        let mut object = scene.objects.into_iter().next().expect("a particle");
-        for (took, expected) in [(4, 4.0), (4_000, 6.0), (2, 4.0)] {
-            object.note_cost(Duration::from_micros(took));
-            assert!((object.cost() * 1e6 - expected).abs() < 1e-3, "{} s", object.cost());
+    fn who_does_something_else_too_is_given_less() {
+        // As if those with great numbers were on a core of half the speed.
+        let micros: Vec<u64> = (0..1_000).map(|object| if object < 500 { 1 } else { 2 }).collect();
+        let total: u64 = micros.iter().sum();
+        // Half of the objects that are dealt out at once, at each of two splits, and what one object takes.
+        let nearly = 2 * (HALF as u64 / 2 + 1) * 2;
+        for besides in [0, 100, 300] {
+            for homes in [2, 3, 4] {
+                let given = dealt(&micros, homes, besides);
+                let share = (total + besides) / u64::from(homes);
+                for (home, expected) in
+                    given.iter().zip([share - besides].into_iter().chain(std::iter::repeat(share)))
+                {
+                    let cost = cost(home);
+                    assert!(
+                        cost.abs_diff(expected) <= nearly,
+                        "{cost}, not {expected} µs: {given:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn who_has_no_time_left_is_given_little() {
+        let given = dealt(&[1; 300], 2, 1_000_000);
+        assert_eq!(given.iter().map(Vec::len).collect::<Vec<_>>(), [1, 3]);
+        assert!(cost(&given[0]) <= 40, "{given:?}");
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn all_are_dealt_out_to_blocks_of_like_size(
+            micros in proptest::collection::vec(1..100_u64, 1..400),
+            homes in 1..9_u32,
+            besides in 0..20_000_u64,
+        ) {
+            let given = dealt(&micros, homes, besides);
+            prop_assert_eq!(given.iter().map(|home| cost(home)).sum::<u64>(), micros.iter().sum());
+            let sizes: Vec<usize> = given.iter().flatten().map(|&(_, objects)| objects).collect();
+            let even = micros.len().div_ceil(sizes.len()).next_multiple_of(HALF);
+            prop_assert!(sizes.iter().all(|size| (1..=UNEVENNESS * even).contains(size)), "{:?}", given);
         }
     }
 }
