@@ -8,6 +8,7 @@ use dualframe_sim::block::Block;
 use dualframe_sim::blocking::{Blocking, BlockingError, Grain};
 use dualframe_sim::geometry::Bounds;
 use dualframe_sim::object::Object;
+use glam::Vec3;
 
 fn numbers(block: &Block) -> Vec<u32> {
     block.objects().iter().map(|object| object.id().0).collect()
@@ -90,6 +91,27 @@ fn blocks_of_particles_are_compact() {
     let all = particles.iter().fold(Bounds::EMPTY, |all, block| all.union(&block.bounds()));
     // By their numbers they would be in layers as wide as all of them.
     assert!(widest < 0.7 * side(all), "{widest} m of {} m", side(all));
+}
+
+#[test]
+fn a_room_that_is_nearly_a_cube_is_split_the_same_way_each_time() {
+    let grouped = |stretch: Vec3| -> Vec<Vec<u32>> {
+        let mut objects = particles(300, false, true).objects;
+        for object in &mut objects {
+            let Some(mesh) = object.geometry.as_mesh_mut() else { continue };
+            for node in 0..mesh.positions.len() {
+                let position = mesh.positions.get(node).expect("a node");
+                mesh.positions.set(node, position * stretch);
+            }
+            object.refit();
+        }
+        blocks(objects, Grain::Spatial, 2).iter().map(numbers).collect()
+    };
+    let as_it_is = grouped(Vec3::ONE);
+    for axis in Vec3::AXES {
+        assert_eq!(grouped(Vec3::ONE + 0.1 * axis), as_it_is, "{axis}");
+    }
+    assert_ne!(grouped(Vec3::new(1.0, 1.0, 2.0)), as_it_is);
 }
 
 #[test]

@@ -134,6 +134,11 @@ fn part_at(keys: &mut [Key], count: usize, axis: usize) -> (&mut [Key], &mut [Ke
     keys.split_at_mut(count.min(keys.len()))
 }
 
+/// How much longer than the sides before it a side must be to be the longest; a quarter. Objects that fill a cube would
+/// else be split another way each time, and go from one core's caches to another's.
+const NOTABLY: f32 = 1.25;
+
+/// The axis along which they extend notably farther than along those before it.
 fn longest_side(keys: &[Key]) -> usize {
     let side = |axis: usize| {
         let values = keys.iter().map(|key| key.center[axis]);
@@ -142,5 +147,7 @@ fn longest_side(keys: &[Key]) -> usize {
         high - low
     };
     let sides = [side(0), side(1), side(2)];
-    (1..3).fold(0, |longest, axis| if sides[axis] > sides[longest] { axis } else { longest })
+    let longer =
+        |longest, axis| if sides[axis] > NOTABLY * sides[longest] { axis } else { longest };
+    (1..3).fold(0, longer)
 }
