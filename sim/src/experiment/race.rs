@@ -12,11 +12,13 @@ use super::load::RenderLoad;
 use super::outcome::Outcome;
 use super::subject::Subject;
 use super::timing::{Contender, Series};
+use crate::blocking::FRAMES_PER_BLOCKING;
 use crate::executor::{ExecutorKind, FrameRecord};
 use crate::manager::VeManager;
 
-/// Frames before the clock starts; usually 16: shorter runs are mostly cold start.
-pub const WARM_UP: u64 = 16;
+/// Frames before the clock starts; usually 32: by then caches are warm, and blocks are formed anew by what the first
+/// frames took.
+pub const WARM_UP: u64 = FRAMES_PER_BLOCKING;
 
 /// An executor that takes part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
