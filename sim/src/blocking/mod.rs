@@ -219,8 +219,8 @@ fn block_count(objects: usize, workers: usize) -> usize {
     let fewest_tests = (BLOCKS * (objects as f64).cbrt().powi(2)).round() as usize;
     let [fewest, usual] = [FEWEST_PER_WORKER, USUAL_PER_WORKER].map(|blocks| blocks * workers);
     let shared_out = (objects / FILLING).clamp(fewest, usual);
-    // No worker is to have one more than another.
-    let wanted = fewest_tests.max(shared_out).next_multiple_of(workers);
+    // No worker is to have one more than another; rather fewer and fuller ones.
+    let wanted = (fewest_tests.max(shared_out) + (workers - 1) / 2) / workers * workers;
     wanted.min(objects.div_ceil(HALF))
 }
 
