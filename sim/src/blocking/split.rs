@@ -44,8 +44,8 @@ impl Key {
 }
 
 /// Shares objects and blocks out to homes that are to take equally long: parts along the longest side until each is
-/// one home's, which has objects in proportion to its blocks. `besides` seconds a frame are taken up already of who
-/// works at the first of all homes. While no costs are known, each gets as many.
+/// one home's, which has blocks in proportion to its objects. Who works at the first of all homes does something else
+/// for `besides` seconds a frame. While no costs are known, each gets as many.
 pub(super) fn among_homes(
     keys: &mut [Key],
     members: &mut [Members],
