@@ -5,7 +5,6 @@ mod split;
 use thiserror::Error;
 
 use self::split::{Key, Members};
-
 use crate::block::Block;
 use crate::object::Object;
 use crate::simd::HALF;
