@@ -21,6 +21,8 @@ pub(crate) trait Outputs {
     fn renders_visible(&mut self);
     /// The pipeline is at rest.
     fn all_done(&mut self);
+    /// Whether this worker has the shared renderer, or has it from now on, since nobody else had it.
+    fn takes_renderer(&mut self) -> bool;
 }
 
 /// Interactions, and other work units, that a worker may carry at once: more than one block has neighbours,
@@ -47,6 +49,8 @@ pub(crate) struct Carry<'p, 'm, E: Environment, W: Waiting> {
     renders: u32,
     /// Whether this worker is counted among the hungry.
     hungry: bool,
+    /// Whether this worker has the shared renderer.
+    pub(crate) renders_shared: bool,
     pub(crate) home: u32,
 }
 
@@ -60,6 +64,7 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
             queued: 0,
             renders: 0,
             hungry: false,
+            renders_shared: false,
             home,
         }
     }
@@ -164,6 +169,25 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         None
     }
 
+    /// Has the shared renderer while there is something to render, and no longer.
+    #[inline]
+    pub(crate) fn share_renderer(&mut self) {
+        if !self.pipeline.shared.is_offered() {
+            return;
+        }
+        match (self.has_rendering() || self.pipeline.render_visible(), self.renders_shared) {
+            (true, false) => _ = self.takes_renderer(),
+            (false, true) => self.put_renderer_back(),
+            _ => {}
+        }
+    }
+
+    fn put_renderer_back(&mut self) {
+        if ::core::mem::take(&mut self.renders_shared) {
+            self.pipeline.shared.put_back();
+        }
+    }
+
     /// Whether `unit` is another home's, whose worker is to have it if it comes for it in time.
     #[inline]
     fn is_at_home_elsewhere(&self, unit: UnitId) -> bool {
@@ -188,13 +212,19 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
             self.interactions.clear();
         }
         self.shed();
+        if !seeded!(LeavesWithRenderer) {
+            self.put_renderer_back();
+        }
         if seeded!(CallNotPassedOn) {
             return self.announce();
         }
         // Whoever still counts this worker among the sleepers has queued its work before this.
         fence(site::FENCE_LEAVE);
         let left = self.pipeline.visible_anywhere(true);
-        self.renders += u32::from(left.contains(Stage::Render));
+        // A shared renderer anyone may take.
+        let anyone = self.pipeline.shared.is_offered() && !seeded!(RenderingCallsHolders);
+        let renders = if anyone { &mut self.queued } else { &mut self.renders };
+        *renders += u32::from(left.contains(Stage::Render));
         self.queued += u32::from(left.without(Stage::Render) != Stages::NONE);
         self.announce();
     }
@@ -238,6 +268,12 @@ impl<E: Environment, W: Waiting> Outputs for Carry<'_, '_, E, W> {
 
     fn all_done(&mut self) {
         (self.queued, self.renders) = (u32::MAX / 2, u32::MAX / 2);
+    }
+
+    #[inline]
+    fn takes_renderer(&mut self) -> bool {
+        self.renders_shared = self.renders_shared || self.pipeline.shared.take();
+        self.renders_shared
     }
 }
 

@@ -88,6 +88,12 @@ faults! {
     TagNotChecked;
     /// A worker leaves with what it carries.
     LeavesWithCarry;
+    /// A worker leaves with the shared renderer.
+    LeavesWithRenderer;
+    /// A worker sleeps with the shared renderer.
+    SleepsWithRenderer;
+    /// Lost wake-up: a worker that leaves a rendering behind calls holders, where anyone could do it.
+    RenderingCallsHolders;
     /// The gate is armed again after the frame's updates were let go.
     GateArmedLate;
     /// The countdown of renderings is armed again after the next frame is on display.

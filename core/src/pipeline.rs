@@ -10,7 +10,7 @@ use crate::stage::{Stage, Stages};
 use crate::storage::Memory;
 use crate::sync::site;
 use crate::tables::{Home, Tables};
-use crate::token::{Token, TokenOffice};
+use crate::token::{Shared, Token, TokenOffice};
 use crate::unit::{UnitId, Work};
 use crate::wait::{Bells, Spin, Waiting};
 use crate::worker::Worker;
@@ -59,6 +59,7 @@ pub struct Pipeline<'m, E: Environment, W: Waiting = Spin> {
     pub(crate) bells: Bells,
     pub(crate) waiting: W,
     pub(crate) office: TokenOffice,
+    pub(crate) shared: Shared<E::Renderer>,
     pub(crate) config: Config,
 }
 
@@ -75,6 +76,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
             bells: Bells::new(),
             waiting,
             office: TokenOffice::new(config.tokens),
+            shared: Shared::new(),
             config,
             tables,
         })
@@ -114,9 +116,36 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         &self,
         renderer: E::Renderer,
     ) -> Result<Token<'_, E::Renderer>, (E::Renderer, TableFull)> {
+        self.office.issue(renderer).map_err(|renderer| (renderer, self.no_token_left()))
+    }
+
+    fn no_token_left(&self) -> TableFull {
         let capacity = self.config.tokens as usize;
-        let full = TableFull { table: Table::Tokens, capacity, needed: capacity + 1 };
-        self.office.issue(renderer).map_err(|renderer| (renderer, full))
+        TableFull { table: Table::Tokens, capacity, needed: capacity + 1 }
+    }
+
+    /// Leaves `renderer` to all workers instead of giving tokens to some: whoever has updated a unit renders it too,
+    /// unless another worker is rendering, and so need not bring it from that core's cache to another's. It stays
+    /// until it is [taken back](Self::take_back), and all tokens with it.
+    ///
+    /// # Errors
+    /// The renderer back, and the number of tokens there are, if any is out or there is none.
+    pub fn share(&mut self, renderer: E::Renderer) -> Result<(), (E::Renderer, TableFull)>
+    where
+        E::Renderer: Send,
+    {
+        if !self.office.close(self.config.tokens) {
+            return Err((renderer, self.no_token_left()));
+        }
+        self.shared.offer(renderer);
+        Ok(())
+    }
+
+    /// The renderer that was left to all workers, if there is one.
+    pub fn take_back(&mut self) -> Option<E::Renderer> {
+        let renderer = self.shared.withdraw()?;
+        self.office.open(self.config.tokens);
+        Some(renderer)
     }
 
     /// Whether every frame that was let run has been swapped.

@@ -14,7 +14,6 @@ use crate::inputs::Inputs;
 use crate::pipeline::{BroadPhase, Pipeline};
 use crate::storage::Chain;
 use crate::sync::{seeded, site};
-use crate::token::Token;
 use crate::unit::{InteractionId, NONE, UnitId, Work};
 use crate::wait::Waiting;
 
@@ -233,7 +232,8 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         // before the unit is passed on to either.
         slot.pending.arm(if seeded!(RenderingNotAwaited) { 1 } else { 2 });
         slot.frame.store(frame.next().0, site::FRAME_TAG);
-        if holder && (self.window.display() == frame || seeded!(RenderedBeforeSwap)) {
+        let on_display = self.window.display() == frame || seeded!(RenderedBeforeSwap);
+        if on_display && (holder || out.takes_renderer()) {
             out.emit(Work::Render(unit));
         } else {
             out.queue(Work::Render(unit));
@@ -264,11 +264,10 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         &self,
         env: &E,
         unit: UnitId,
-        token: &mut Token<'_, E::Renderer>,
+        renderer: &mut E::Renderer,
         out: &mut impl Outputs,
     ) -> Result<(), E::Error> {
         let frame = self.rendered_frame(unit);
-        let renderer = &mut token.renderer;
         // SAFETY: the unit's next update waits for the arrival below; until then it is only read.
         let mut outcome = unsafe {
             let object = &self.tables.unit(unit).object;

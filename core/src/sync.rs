@@ -213,6 +213,12 @@ sites! {
     COUNT_LOOK = Relaxed;
     /// Acquire and Release: the token's renderer moves from holder to holder.
     TOKEN_COUNT = AcqRel;
+    /// Relaxed: a hint, and the CAS after it decides; or looked at after `FENCE_SLEEP`, as queues are.
+    SHARED_LOOK = Relaxed;
+    /// Acquire: pairs with `SHARED_PUT`.
+    SHARED_TAKE = Acquire;
+    /// Release: the shared renderer moves on to whoever takes it next.
+    SHARED_PUT = Release;
     /// Acquire and Release: a new reader enters after the one whose place it takes has left, so
     /// that the writer, who sees it enter, sees the other's slot free.
     READERS_COUNT = AcqRel;

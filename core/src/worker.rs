@@ -9,7 +9,7 @@ use crate::probe::{NoProbe, Probe};
 use crate::stage::Stage;
 use crate::sync::seeded;
 use crate::token::Token;
-use crate::unit::Work;
+use crate::unit::{UnitId, Work};
 use crate::wait::{Spin, Waiting};
 
 /// What a step did.
@@ -99,7 +99,12 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
             (Work::Update(unit), token) => {
                 pipeline.update(env, unit, token.is_some(), &mut self.carry)
             }
-            (Work::Render(unit), Some(token)) => pipeline.render(env, unit, token, &mut self.carry),
+            (Work::Render(unit), Some(token)) => {
+                pipeline.render(env, unit, token.renderer(), &mut self.carry)
+            }
+            (Work::Render(unit), None) if self.carry.renders_shared => {
+                self.render_shared(env, unit)
+            }
             (Work::Render(_), None) => {
                 self.carry.queue(work);
                 Ok(())
@@ -110,10 +115,29 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         outcome.map(|()| Step::Worked(self.stage))
     }
 
+    /// Renders by the shared renderer, which this worker has.
+    fn render_shared(&mut self, env: &E, unit: UnitId) -> Result<(), E::Error> {
+        let Self { carry, .. } = self;
+        let pipeline = carry.pipeline;
+        // If the callback panics, nobody else is to have what it leaves of the renderer.
+        carry.renders_shared = false;
+        // SAFETY: this worker took it, and has not put it back.
+        let outcome = unsafe {
+            pipeline.shared.with_mut(|renderer| match renderer {
+                Some(renderer) => pipeline.render(env, unit, renderer, carry),
+                // It is there as long as it is offered.
+                None => Ok(()),
+            })
+        };
+        carry.renders_shared = true;
+        outcome
+    }
+
     /// What is carried, or what migration finds (Fig. 8).
     fn next_work(&mut self) -> Option<Work> {
         let pipeline = self.carry.pipeline;
-        let holder = self.token.is_some();
+        self.carry.share_renderer();
+        let holder = self.token.is_some() || self.carry.renders_shared;
         // Rendering first: only holders can, and a chain of carry-overs must not starve it.
         if holder
             && !seeded!(CarriedBeforeRendering)
@@ -144,8 +168,10 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
     /// Whether a step would find work now, or the pipeline is at rest.
     pub fn has_cause_to_wake(&self) -> bool {
         let pipeline = self.carry.pipeline;
+        let renders = self.token.is_some() || pipeline.shared.is_free();
         !self.carry.is_empty()
-            || !pipeline.visible_anywhere(self.token.is_some()).is_empty()
+            || (self.carry.renders_shared && !seeded!(SleepsWithRenderer))
+            || !pipeline.visible_anywhere(renders).is_empty()
             || pipeline.finished()
     }
 

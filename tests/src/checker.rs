@@ -99,7 +99,7 @@ impl Expected {
             tests,
             solitary,
             entry: case.entry,
-            tokens: case.tokens as usize,
+            tokens: if case.shared { 1 } else { case.tokens as usize },
         }
     }
 }

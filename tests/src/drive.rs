@@ -162,9 +162,15 @@ fn run_pipeline<'c>(case: &'c Case, trace: &'c Trace) -> (Outcome, Vec<String>) 
         trace.gather(vec![Record { begin, end: trace.tick(), thread: u32::MAX, act }]);
         pipeline.run(frames).expect("a pipeline at rest");
         start += frames;
+        if case.shared {
+            pipeline.share(Screen { token: 0 }).map_err(drop).expect("no token is out");
+        }
         failures.extend(run_segment(case, trace, &pipeline, segment as u32));
         if !pipeline.finished() || pipeline.frame().0 != start {
             wrong.push(format!("stopped at {:?}, not at frame {start}", pipeline.frame()));
+        }
+        if pipeline.take_back().is_some() != case.shared {
+            wrong.push("the shared renderer does not come back".to_owned());
         }
     }
     let bodies = pipeline.objects_mut().map(|body| *body).collect();
@@ -187,11 +193,12 @@ fn run_segment<'c>(
     segment: u32,
 ) -> Vec<Failure> {
     let token = |token| pipeline.token(Screen { token }).map_err(drop).expect("a token");
+    let tokens = if case.shared { 0 } else { case.tokens };
     let shop = Shop {
         case,
         trace,
         segment,
-        tokens: Mutex::new((0..case.tokens).map(token).collect()),
+        tokens: Mutex::new((0..tokens).map(token).collect()),
         failures: Mutex::new(vec![]),
         steps: AtomicU32::new(0),
         broken: AtomicBool::new(false),

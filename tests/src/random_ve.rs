@@ -26,6 +26,8 @@ pub struct Case {
     pub workers: u32,
     /// Render tokens.
     pub tokens: u32,
+    /// Whether all of them are in one renderer that is left to all workers.
+    pub shared: bool,
     /// Homes that the units are shared out to.
     pub homes: u32,
     /// Whether callbacks fail now and then.
@@ -93,9 +95,15 @@ pub fn cases(broad_phase: BroadPhase, sleep: bool) -> impl Strategy<Value = Case
     let bodies = prop::collection::vec(body(), 1..8);
     let edges = prop::collection::vec((0..64_u32, 0..64_u32), 0..12);
     let segments = prop::collection::vec(1..6_u32, 1..4);
-    let running = (segments, entry, 1..=8_u32, 1..=2_u32, 1..=3_u32, prop::bool::ANY);
+    let rendering = (1..=2_u32, prop::bool::ANY);
+    let running = (segments, entry, 1..=8_u32, rendering, 1..=3_u32, prop::bool::ANY);
     (any::<u64>(), bodies, edges, running).prop_map(
-        move |(seed, mut units, edges, (segments, entry, workers, tokens, homes, faults))| {
+        move |(
+            seed,
+            mut units,
+            edges,
+            (segments, entry, workers, (tokens, shared), homes, faults),
+        )| {
             let count = units.len() as u32;
             for (unit, (_, body)) in units.iter_mut().enumerate() {
                 body.unit = unit as u32;
@@ -112,6 +120,7 @@ pub fn cases(broad_phase: BroadPhase, sleep: bool) -> impl Strategy<Value = Case
                 entry,
                 workers,
                 tokens,
+                shared,
                 homes,
                 faults,
                 sleep,

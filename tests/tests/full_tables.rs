@@ -351,6 +351,31 @@ fn as_many_tokens_as_there_are() {
 }
 
 #[test]
+fn all_tokens_or_a_shared_renderer() {
+    for tokens in [0, 1, 3] {
+        let sizes = Sizes::spatial(1, 2, 0, 1);
+        let sizes = Sizes { config: Config { tokens, ..sizes.config }, ..sizes };
+        sizes.with(|pipeline| {
+            let mut pipeline = pipeline.expect("tables that fit");
+            let capacity = tokens as usize;
+            let none_left = Err(((), full(Table::Tokens, capacity, capacity + 1)));
+            assert_eq!(pipeline.take_back(), None);
+            if tokens == 0 {
+                assert_eq!(pipeline.share(()), none_left);
+                return;
+            }
+            assert_eq!(pipeline.share(()), Ok(()));
+            assert_eq!(pipeline.token(()).map(drop), none_left);
+            assert_eq!(pipeline.share(()), none_left, "there is one");
+            assert_eq!(pipeline.take_back(), Some(()));
+            assert_eq!(pipeline.take_back(), None);
+            std::mem::forget(pipeline.token(()));
+            assert_eq!(pipeline.share(()), none_left, "one is out");
+        });
+    }
+}
+
+#[test]
 fn no_token_of_another_pipeline_and_no_second_one() {
     let sizes = Sizes::spatial(1, 2, 0, 1);
     let sizes = Sizes { config: Config { tokens: 2, ..sizes.config }, ..sizes };

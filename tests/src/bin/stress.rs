@@ -37,6 +37,8 @@ struct Crowd {
     config: Config,
     /// Whether idle workers sleep.
     sleep: bool,
+    /// Whether the renderer is left to all workers.
+    shared: bool,
 }
 
 /// Place, speed, what was felt, what was heard.
@@ -115,7 +117,8 @@ impl Crowd {
         let tokens = 1 + one_of(2, 2) as u32;
         let homes = 1 + one_of(6, 3) as u32;
         let config = Config { broad_phase, entry, tokens, homes };
-        Self { seed, units: 1 + one_of(3, 10) as u32, config, sleep: one_of(4, 2) == 1 }
+        let [sleep, shared] = [4, 7].map(|what| one_of(what, 2) == 1);
+        Self { seed, units: 1 + one_of(3, 10) as u32, config, sleep, shared }
     }
 
     /// Every body's bits after all frames, by so many workers.
@@ -149,6 +152,9 @@ impl Crowd {
         let made = Pipeline::new(memory, self.config, Park::default());
         let mut pipeline = made.map_err(|error| error.to_string())?;
         pipeline.run(FRAMES).map_err(|error| error.to_string())?;
+        if self.shared {
+            pipeline.share(Vec::new()).map_err(|(_, full)| full.to_string())?;
+        }
         std::thread::scope(|scope| {
             let pipeline = &pipeline;
             let running: Vec<_> =
@@ -158,7 +164,7 @@ impl Crowd {
         Ok(pipeline.objects_mut().map(|body| body.map(f32::to_bits)).collect())
     }
 
-    /// One worker's life; the first ones have a token each.
+    /// One worker's life; the first ones have a token each, if the renderer is not left to all.
     fn work(self, pipeline: &Pipeline<'_, Self, Park>, home: u32) -> Result<(), String> {
         let mut worker = pipeline.worker_at(home);
         if let Ok(token) = pipeline.token(Vec::new()) {

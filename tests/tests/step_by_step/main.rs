@@ -202,6 +202,31 @@ fn a_token_goes_from_hand_to_hand() {
 }
 
 #[test]
+fn whoever_updates_renders_if_the_shared_renderer_is_free() {
+    for is_free in [false, true] {
+        with(2, 2, 1, |mut pipeline, _| {
+            pipeline.run(1).expect("at rest");
+            pipeline.share(()).expect("no token is out");
+            let (mut a, mut b) = (pipeline.worker_at(0), pipeline.worker_at(1));
+            assert_eq!([a.step(&FAR), b.step(&FAR)], [ENTERED, ENTERED]);
+            assert_eq!([a.step(&FAR), a.step(&FAR)], [UPDATED, RENDERED]);
+            if is_free {
+                assert_eq!(a.step(&FAR), IDLE, "and put the renderer back");
+                assert_eq!([b.step(&FAR), a.step(&FAR)], [UPDATED, IDLE]);
+                assert!(!a.has_cause_to_wake(), "the other one is about to render");
+                assert_eq!(b.step(&FAR), RENDERED);
+            } else {
+                assert!(a.has_cause_to_wake(), "it has the renderer");
+                assert_eq!([b.step(&FAR), b.step(&FAR)], [UPDATED, IDLE]);
+                assert!(!b.has_cause_to_wake());
+                assert_eq!(a.step(&FAR), RENDERED);
+            }
+            assert!(pipeline.finished());
+        });
+    }
+}
+
+#[test]
 fn nobody_wakes_without_cause() {
     with(1, 1, 1, |mut pipeline, notes| {
         let worker = pipeline.worker();

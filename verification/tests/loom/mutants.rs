@@ -2,7 +2,9 @@
 //! one step, alone, and some model must notice. A fence is weakened to none as well.
 
 use crate::models::hunt::{Kill, each, kill};
-use crate::models::{Model, arrivals, bell, countdown, inbox, latest, pipeline, ring, token};
+use crate::models::{
+    Model, arrivals, bell, countdown, inbox, latest, pipeline, ring, shared, token,
+};
 use dualframe_core_model::instrument::weaken;
 use dualframe_core_model::sync::{Site, site};
 use std::sync::atomic::Ordering::{self, AcqRel, Acquire, Relaxed, Release, SeqCst};
@@ -20,6 +22,7 @@ fn suspects(name: &str) -> &'static [Model] {
         "LATEST" | "READERS" => latest::ALL,
         "BELL" | "FENCE" => bell::ALL,
         "TOKEN" | "STATIC" => token::ALL,
+        "SHARED" => shared::ALL,
         "DISPLAY" => pipeline::ALL,
         _ => panic!("no model is assigned to {name}"),
     }

@@ -81,6 +81,8 @@ const LOOK: u32 = 9 + (2 + POP + 1 + PUSH);
 /// Rendering is looked for first, then anything at home and elsewhere, and at most four times at each home
 /// what was seen may be gone.
 const FIND: u32 = 13 + HOMES as u32 * 4 * LOOK;
+/// A shared renderer is taken if a rendering is seen, or put back if none is.
+const SHARE_RENDERER: u32 = 3 + 2;
 /// Where nobody takes away what was seen.
 const FIND_ALONE: u32 = 3 + (HOMES as u32 - 1) * 9 + LOOK;
 /// Once round a loop whose word another thread changed.
@@ -96,7 +98,7 @@ fn sort(n: u32, each: u32) -> u32 {
 ///
 /// Each unit has a modelled interaction with each other. `opens`: whether it opens a frame, where nobody interferes; `None` where others do, and it may.
 fn bound(units: u32, did: Did, opens: Option<bool>) -> u32 {
-    let find = if opens.is_some() { FIND_ALONE } else { FIND };
+    let find = if opens.is_some() { FIND_ALONE } else { SHARE_RENDERER + FIND };
     let share = 2 + CARRIED * (1 + PUSH) + ANNOUNCE;
     let gate = |opens| if opens { 8 + units * (1 + EMIT) } else { 2 };
     // A solitary unit leaves the gate where others are passed on; there is none where one is alone.
@@ -112,7 +114,9 @@ fn bound(units: u32, did: Did, opens: Option<bool>) -> u32 {
         Stage::Update => {
             let candidates = sort(did.candidates, 13) + 6 * did.candidates;
             let letters = 2 + LETTERS * (5 + 3 + PUSH) + sort(LETTERS, 7);
-            6 + candidates + letters + did.posts * (6 + POP) + EMIT + pass_on
+            // Two to take a shared renderer.
+            let renderer = if opens.is_some() { 0 } else { 2 };
+            6 + renderer + candidates + letters + did.posts * (6 + POP) + EMIT + pass_on
         }
         // Under `Entry::AfterSwap` every unit is passed on.
         Stage::Render => 5 + (1 + EMIT) + if did.swaps { units * EMIT } else { 0 } + pass_on,

@@ -11,6 +11,7 @@ pub(crate) mod inbox;
 pub(crate) mod latest;
 pub(crate) mod pipeline;
 pub(crate) mod ring;
+pub(crate) mod shared;
 pub(crate) mod token;
 mod ve;
 
@@ -157,6 +158,7 @@ pub(crate) fn all() -> impl Iterator<Item = Model> {
         latest::ALL,
         bell::ALL,
         token::ALL,
+        shared::ALL,
         pipeline::ALL,
         cost::ALL,
     ];

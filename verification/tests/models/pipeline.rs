@@ -22,6 +22,7 @@ pub(crate) const ALL: &[Model] = &[
     ("pipeline::pairwise_after_swap", pairwise_after_swap),
     ("pipeline::pools_come_round", pools_come_round),
     ("pipeline::two_tokens", two_tokens),
+    ("pipeline::shared_renderer", shared_renderer),
     ("pipeline::solitary_unit", solitary_unit),
     ("pipeline::letters", letters),
     ("pipeline::errors_do_no_harm", errors_do_no_harm),
@@ -210,6 +211,12 @@ fn pools_come_round() {
 fn two_tokens() {
     let setup = Setup { tokens: 2, ..Setup::default() };
     two_workers("pipeline::two_tokens", setup, (2, 3, 20), ANY);
+}
+
+/// Whoever updates a unit renders it, if the other is not rendering.
+fn shared_renderer() {
+    let setup = Setup { shared: true, ..Setup::default() };
+    two_workers("pipeline::shared_renderer", setup, (2, 3, 20), ANY);
 }
 
 /// Two that interact and one that does not.

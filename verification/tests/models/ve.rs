@@ -57,6 +57,8 @@ pub(crate) struct Setup {
     pub(crate) entry: Entry,
     /// Render tokens.
     pub(crate) tokens: u32,
+    /// Whether the renderer is left to all workers.
+    pub(crate) shared: bool,
     /// Units from this number on are solitary.
     pub(crate) solitary_from: u32,
     /// Whether unit 0 posts a letter to the last unit in every update.
@@ -67,21 +69,24 @@ pub(crate) struct Setup {
 
 impl Default for Setup {
     fn default() -> Self {
-        Self {
-            units: 2,
-            far: false,
-            frames: 2,
-            broad_phase: BroadPhase::Spatial,
-            entry: Entry::AfterUpdate,
-            tokens: 1,
-            solitary_from: u32::MAX,
-            letters: false,
-            fail: false,
-        }
+        Self::DEFAULT
     }
 }
 
 impl Setup {
+    pub(crate) const DEFAULT: Self = Self {
+        units: 2,
+        far: false,
+        frames: 2,
+        broad_phase: BroadPhase::Spatial,
+        entry: Entry::AfterUpdate,
+        tokens: 1,
+        shared: false,
+        solitary_from: u32::MAX,
+        letters: false,
+        fail: false,
+    };
+
     pub(crate) fn pairs(&self) -> Vec<[u32; 2]> {
         let social = self.units.min(self.solitary_from);
         (0..social).flat_map(|b| (0..b).map(move |a| [a, b])).collect()
@@ -267,6 +272,10 @@ pub(crate) fn build_with<W: Waiting + 'static>(
     let config = Config { broad_phase, entry, tokens, homes: HOMES as u32 };
     let pipeline = lend(Pipeline::new(memory, config, waiting).unwrap());
     pipeline.run(setup.frames).unwrap();
+    if setup.shared {
+        let screen: Screen = lend(Guarded::new(0));
+        assert!(pipeline.share(screen).is_ok());
+    }
     (pipeline, lend(World { setup, journal: Mutex::default(), values: Mutex::new(vec![0; units]) }))
 }
 

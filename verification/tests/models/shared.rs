@@ -1,0 +1,64 @@
+//! A renderer that is left to all workers: one has it at a time, and no rendering is left over.
+//!
+//! A worker that sleeps for ever, or a rendering that nobody comes for, exceeds loom's limit of branches.
+
+use super::ve::{Setup, build, step, verify};
+use super::{Model, Role, check, together};
+use dualframe_core_model::stage::Stage;
+use dualframe_core_model::worker::Step;
+
+pub(crate) const ALL: &[Model] =
+    &[("shared::leaver_calls", leaver_calls), ("shared::sleepers_end", sleepers_end)];
+
+/// Two units that do not interact, one at each worker's home, and a renderer left to both workers.
+const SHARED: Setup = Setup { solitary_from: 0, frames: 1, shared: true, ..Setup::DEFAULT };
+
+/// Two workers who wait before every step: both come to an end. The outcome is how many units each rendered:
+/// one that another is about to render may be rendered by that one too.
+fn sleepers_end() {
+    check("shared::sleepers_end", Some(2), 2, [[0, 2], [1, 1], [2, 0]], |order| {
+        let (pipeline, world) = build(SHARED);
+        let role = |home: u32| -> Role<u32> {
+            Box::new(move || {
+                let mut worker = pipeline.worker_at(home);
+                let mut rendered = 0;
+                while !pipeline.finished() {
+                    worker.wait();
+                    let did = step(&mut worker, world);
+                    rendered += u32::from(did == Step::Worked(Stage::Render));
+                }
+                rendered
+            })
+        };
+        let rendered = together(order, vec![role(0), role(1)]);
+        verify(pipeline, world);
+        [rendered[0], rendered[1]]
+    });
+}
+
+/// One worker leaves after some steps, with the renderer or without, and with what it carries; the other one, who
+/// sleeps where it finds nothing to do, comes to the end. The outcome is how many units that one rendered.
+fn leaver_calls() {
+    check("shared::leaver_calls", Some(1), 10, [0, 1, 2], |order| {
+        let (pipeline, world) = build(SHARED);
+        let leave: Role<u32> = Box::new(move || {
+            let mut worker = pipeline.worker_at(0);
+            (0..order / 2).for_each(|_| _ = step(&mut worker, world));
+            0
+        });
+        let stay: Role<u32> = Box::new(move || {
+            let mut worker = pipeline.worker_at(1);
+            let mut rendered = 0;
+            while !pipeline.finished() {
+                match step(&mut worker, world) {
+                    Step::Idle => worker.wait(),
+                    did => rendered += u32::from(did == Step::Worked(Stage::Render)),
+                }
+            }
+            rendered
+        });
+        let rendered = together(order, vec![leave, stay])[1];
+        verify(pipeline, world);
+        rendered
+    });
+}
