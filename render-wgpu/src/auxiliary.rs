@@ -1,6 +1,6 @@
 //! GPU work besides drawing: the auxiliary queue of the render stage (§9).
 //!
-//! Anybody may submit a unit from any thread; whoever holds the render token runs it, since nobody else
+//! Anybody may submit a unit from any thread; whoever has the renderer runs it, since nobody else
 //! may call the device.
 
 use std::sync::Arc;
@@ -23,7 +23,7 @@ const CAPACITY: usize = 256;
 /// A unit of GPU work.
 pub trait GpuUnit: Send {
     /// Whether it looks at the frame that was drawn: such a unit runs when the next frame is, others as
-    /// soon as the token's holder comes to it.
+    /// soon as the renderer comes to it.
     fn needs_frame(&self) -> bool {
         false
     }
@@ -32,7 +32,7 @@ pub trait GpuUnit: Send {
     /// is nothing to do any more, or it cannot be done; that is then the end of the unit.
     fn encode(&mut self, context: &Context<'_>, encoder: &mut CommandEncoder) -> Option<Buffer>;
 
-    /// Told, on the token holder's thread, what is in that buffer once the device is done, or why it
+    /// Told, on the thread that has the renderer, what is in that buffer once the device is done, or why it
     /// never will be.
     fn finish(self: Box<Self>, context: &Context<'_>, results: Result<&[u8], GraphicsError>);
 }
@@ -118,7 +118,7 @@ impl Encoded {
     }
 }
 
-/// The token holder's end of the queue.
+/// The renderer's end of the queue.
 pub(crate) struct Units {
     sender: SyncSender<Box<dyn GpuUnit>>,
     receiver: Receiver<Box<dyn GpuUnit>>,

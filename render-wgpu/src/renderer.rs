@@ -1,4 +1,4 @@
-//! The renderer: what the token's holder draws with.
+//! The renderer: what the thread draws with that has it.
 
 use dualframe_sim::geometry::Geometry;
 use dualframe_sim::object::Object;

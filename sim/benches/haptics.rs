@@ -147,7 +147,7 @@ fn beside<T: Send>(manager: &mut VeManager, work: impl FnOnce() -> T + Send) -> 
     })
 }
 
-fn run(manager: &mut VeManager, on_frame: &mut dyn FnMut()) {
+fn run(manager: &mut VeManager, on_frame: &mut (dyn FnMut() + Send)) {
     let ran = manager.run(16, &mut NullRenderer::new(), &mut |_| on_frame());
     ran.expect("no table is full");
 }

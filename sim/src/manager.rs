@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::blocking::Grain;
 use crate::executor::{
-    Entry, Executor, ExecutorError, ExecutorKind, FrameRecord, MAX_THREADS, PipelineExecutor,
+    Entry, Executor, ExecutorError, ExecutorKind, MAX_THREADS, OnFrame, PipelineExecutor,
     RayonExecutor, RayonOverlappedExecutor, SerialExecutor, StageSeconds, StaticExecutor,
     state_hash,
 };
@@ -105,7 +105,7 @@ impl VeManager {
         &mut self,
         frames: u64,
         renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError> {
         if self.running {
             return Err(ExecutorError::BrokenOff);

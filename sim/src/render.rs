@@ -3,9 +3,9 @@
 use crate::geometry::Geometry;
 use crate::object::Object;
 
-/// A graphics device. It belongs to whoever holds the render token, so it need not be shareable
-/// between threads.
-pub trait Renderer {
+/// A graphics device. One thread has it at a time: it need not be shareable between threads, but goes from one to
+/// the other, to where objects were updated.
+pub trait Renderer: Send {
     /// Draws one object of the current frame in the way its [`Drawing`] says. Objects come in no
     /// particular order.
     ///
@@ -14,6 +14,12 @@ pub trait Renderer {
 
     /// Ends the frame: everything of `frame` is drawn.
     fn swap(&mut self, frame: u64);
+
+    /// Whether it has to stay with the thread that lets the environment run, as the event loop of a window has to on
+    /// some systems. Usually not: objects are then drawn by threads that updated them, in whose caches they are.
+    fn is_bound(&self) -> bool {
+        false
+    }
 }
 
 /// A renderer without a device: it reads what a real one would upload and keeps a checksum of it.

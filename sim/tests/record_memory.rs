@@ -3,7 +3,7 @@
 #![forbid(unsafe_code)]
 
 use std::alloc::System;
-use std::cell::Cell;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use dualframe_sim::executor::{ExecutorKind, FrameRecord};
 use dualframe_sim::manager::{Settings, VeManager};
@@ -35,19 +35,19 @@ fn session(frames: u64) -> (Vec<u8>, usize) {
     let mut recorder = Recorder::begin(Vec::with_capacity(1 << 20), &Header::of(&spec), &manager)
         .expect("a start");
     let mailbox = manager.mailbox();
-    let (first, last) = (Cell::new(0), Cell::new(0));
+    let (first, last) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let mut on_frame = |record: &FrameRecord| {
         mailbox.post(ObjectId(record.frame as u32 % 20), Message::Damping(0.03));
         // Between two checkpoints.
         if record.frame == frames - 58 {
-            first.set(allocations());
+            first.store(allocations(), Ordering::Relaxed);
         }
-        last.set(allocations());
+        last.store(allocations(), Ordering::Relaxed);
     };
     let mut renderer = NullRenderer::new();
     recorder.run(&mut manager, frames, &mut renderer, &mut on_frame).expect("it runs");
     let (file, _) = recorder.finish(&manager).expect("it is written");
-    (file, last.get() - first.get())
+    (file, last.into_inner() - first.into_inner())
 }
 
 /// All bytes that were ever allocated while a file was read, freed or not; and why it ended.

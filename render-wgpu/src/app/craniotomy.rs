@@ -13,7 +13,7 @@ use dualframe_sim::behavior::Bone;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::device::link::{HapticLink, SimulationEnd, ToolState};
 use dualframe_sim::device::motion::Motion;
-use dualframe_sim::executor::FrameRecord;
+use dualframe_sim::executor::{FrameRecord, OnFrame};
 use dualframe_sim::geometry::{Bounds, Volume};
 use dualframe_sim::image;
 use dualframe_sim::manager::VeManager;
@@ -152,7 +152,7 @@ fn run_unwatched<'a, 'c, 'h>(
             }
         };
         let left = frames - manager.frame();
-        let how = (&mut on_frame as &mut dyn FnMut(&FrameRecord), manage);
+        let how = (&mut on_frame as &mut OnFrame<'_>, manage);
         manager = surgery.advance(manager, &mut recording, left, renderer, how)?;
     }
     recording.end(&manager);
@@ -219,7 +219,7 @@ impl<'c> Surgery<'c> {
         recording: &mut Recording<'_>,
         frames: u64,
         renderer: &mut dyn Renderer,
-        (on_frame, manage): (&mut dyn FnMut(&FrameRecord), Manage<'_>),
+        (on_frame, manage): (&mut OnFrame<'_>, Manage<'_>),
     ) -> Result<VeManager, RunError> {
         let until_look = LOOK_FRAMES - manager.frame() % LOOK_FRAMES;
         let (hands, mut watch) = self.operation.parts(renderer);

@@ -30,7 +30,7 @@ use self::scenes::Patient;
 use self::told::Told;
 
 /// Counts the heap allocations made so far.
-pub(crate) type AllocationCounter<'a> = &'a dyn Fn() -> usize;
+pub(crate) type AllocationCounter<'a> = &'a (dyn Fn() -> usize + Sync);
 
 /// Status of a run that was not sound.
 const UNSOUND: u8 = 1;

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 
-use dualframe_sim::executor::{ExecutorError, FrameRecord};
+use dualframe_sim::executor::{ExecutorError, OnFrame};
 use dualframe_sim::manager::VeManager;
 use dualframe_sim::record::{Control, Header, RecordError, Recorder, SceneSpec};
 use dualframe_sim::render::Renderer;
@@ -39,7 +39,7 @@ impl<'a> Recording<'a> {
         manager: &mut VeManager,
         frames: u64,
         renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError> {
         let end = manager.frame() + frames;
         if let Some(recorder) = &mut self.recorder {

@@ -1,8 +1,8 @@
 //! What is said on standard error.
 
-use std::cell::Cell;
 use std::io::{self, Write};
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicU8, Ordering};
 
 use super::error::RunError;
 use super::with_causes;
@@ -10,7 +10,7 @@ use super::with_causes;
 /// What is said on standard error, and the status that the program is to end with: the greatest of all that
 /// went wrong.
 #[derive(Default)]
-pub(super) struct Told(Cell<u8>);
+pub(super) struct Told(AtomicU8);
 
 impl Told {
     /// Says in a line what the person at the terminal should know.
@@ -21,7 +21,8 @@ impl Told {
 
     /// The program is to end with this status, or a greater one.
     pub(super) fn end_with(&self, status: u8) {
-        self.0.set(self.0.get().max(status));
+        // Relaxed, as is the load: nothing else goes by it.
+        self.0.fetch_max(status, Ordering::Relaxed);
     }
 
     /// Says what went wrong.
@@ -36,6 +37,6 @@ impl Told {
     }
 
     pub(super) fn status(&self) -> ExitCode {
-        ExitCode::from(self.0.get())
+        ExitCode::from(self.0.load(Ordering::Relaxed))
     }
 }

@@ -153,11 +153,15 @@ pub struct FrameRecord {
     pub pairs: PairCount,
 }
 
+/// Who is told of every frame once it is swapped, by the thread that swapped it.
+pub type OnFrame<'a> = dyn FnMut(&FrameRecord) + Send + 'a;
+
 /// Something that advances an environment frame by frame.
 pub trait Executor: Send {
     /// Advances by `frames` frames. Every frame's objects go to the renderer, then the frame is
     /// swapped and `on_frame` is told, in the order of the frames; when this returns, all of them are
-    /// swapped. The renderer is called by the calling thread only.
+    /// swapped. The renderer is called by one thread at a time, and by the calling thread only if it
+    /// [is bound](Renderer::is_bound) to that.
     ///
     /// # Errors
     /// More than 30,000 objects crowd so fast that the pipeline's table of blocks that meet, which grows every
@@ -172,7 +176,7 @@ pub trait Executor: Send {
         &mut self,
         frames: u64,
         renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError>;
 
     /// The number of the next frame: the scene's, and one more for each frame done since.

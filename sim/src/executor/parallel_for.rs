@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::clock::{Stage, StageSeconds};
 use super::engine::Engine;
-use super::{Executor, ExecutorError, FrameRecord, world};
+use super::{Executor, ExecutorError, FrameRecord, OnFrame, world};
 use crate::blocking::Grain;
 use crate::mailbox::Mailbox;
 use crate::object::Object;
@@ -64,7 +64,7 @@ impl<P: ParallelFor> Executor for LoopExecutor<P> {
         &mut self,
         frames: u64,
         renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError> {
         let began = Instant::now();
         self.engine.world.outside.begin(self.engine.frame);

@@ -8,7 +8,7 @@ use super::clock::{Clock, Stage, StageSeconds};
 use super::engine::Engine;
 use super::parallel_for::ParallelFor;
 use super::rayon::RayonLoops;
-use super::{Executor, ExecutorError, FrameRecord, world};
+use super::{Executor, ExecutorError, FrameRecord, OnFrame, world};
 use crate::block::Block;
 use crate::blocking::Grain;
 use crate::mailbox::Mailbox;
@@ -61,7 +61,7 @@ impl Executor for RayonOverlappedExecutor {
         &mut self,
         frames: u64,
         renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError> {
         let began = Instant::now();
         let (used, unused) = sync_channel(PICTURES);

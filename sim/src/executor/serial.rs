@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::clock::{Clock, Stage, StageSeconds};
 use super::world::{self, Candidates, Outbox, Outcome, World};
-use super::{Executor, ExecutorError, FrameRecord};
+use super::{Executor, ExecutorError, FrameRecord, OnFrame};
 use crate::behavior::{Room, Workspace};
 use crate::block::Block;
 use crate::blocking::Grain;
@@ -116,7 +116,7 @@ impl Executor for SerialExecutor {
         &mut self,
         frames: u64,
         renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError> {
         let began = Instant::now();
         self.world.outside.begin(self.frame);

@@ -12,7 +12,7 @@ use super::engine::check_threads;
 use super::mail::Mail;
 use super::outside::Outside;
 use super::world::{self, Candidates, Outbox, Outcome, Partners, World};
-use super::{Executor, ExecutorError, FrameRecord};
+use super::{Executor, ExecutorError, FrameRecord, OnFrame};
 use crate::behavior::{Room, Workspace};
 use crate::block::Block;
 use crate::blocking::{Blocking, Grain};
@@ -293,7 +293,7 @@ impl Executor for StaticExecutor {
         &mut self,
         frames: u64,
         renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError> {
         let began = Instant::now();
         self.shared.outside.begin(self.frame);

@@ -81,7 +81,7 @@ impl fmt::Display for Race {
 }
 
 /// What a race tells while it goes on.
-pub(super) type OnFrame<'a> = dyn FnMut(usize, &FrameRecord, Duration) + 'a;
+pub(super) type OnFrame<'a> = dyn FnMut(usize, &FrameRecord, Duration) + Send + 'a;
 
 impl Race {
     /// Times the runners against each other. `phase` measures the machine's present phase, `done` is
@@ -157,7 +157,7 @@ impl Race {
         &self,
         runner: Runner,
         expected: &Cell<Option<u64>>,
-        on_frame: &mut dyn FnMut(&FrameRecord, Duration),
+        on_frame: &mut (dyn FnMut(&FrameRecord, Duration) + Send),
     ) -> Result<f64, ExperimentError> {
         let mut session = self.subject.start(runner)?;
         let mut renderer = self.load.renderer();

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::error::ExperimentError;
 use super::race::Runner;
 use crate::blocking::Grain;
-use crate::executor::{ExecutorError, FrameRecord};
+use crate::executor::{ExecutorError, OnFrame};
 use crate::manager::{Settings, VeManager};
 use crate::render::Renderer;
 use crate::scene::ParticleScene;
@@ -107,7 +107,7 @@ impl Session {
         &mut self,
         frames: u64,
         renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError> {
         let Self { manager, operation } = self;
         let Some(operation) = operation else {

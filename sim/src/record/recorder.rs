@@ -11,7 +11,7 @@ use super::header::Header;
 use super::journal::Journal;
 use super::wire::Encoder;
 use super::{CHECKPOINT_FRAMES, frames_to_checkpoint};
-use crate::executor::FrameRecord;
+use crate::executor::OnFrame;
 use crate::manager::VeManager;
 use crate::object::ObjectId;
 use crate::render::Renderer;
@@ -79,7 +79,7 @@ impl<W: Write> Recorder<W> {
         manager: &mut VeManager,
         frames: u64,
         renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<(), RecordError> {
         let end = manager.frame().saturating_add(frames);
         loop {

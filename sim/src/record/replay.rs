@@ -9,7 +9,7 @@ use super::flaw::{Difference, ObjectDifference, ReadError, ReplayError};
 use super::header::Header;
 use super::reader::Reader;
 use super::recorder::hash_objects;
-use crate::executor::FrameRecord;
+use crate::executor::OnFrame;
 use crate::manager::VeManager;
 use crate::message::{Letter, Message};
 use crate::object::ObjectId;
@@ -121,7 +121,7 @@ impl<R: Read> Replay<R> {
         manager: &mut VeManager,
         most: u64,
         renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<Step, ReplayError> {
         let mut left = most;
         loop {
@@ -155,7 +155,7 @@ impl<R: Read> Replay<R> {
         manager: &mut VeManager,
         frames: u64,
         renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ReplayError> {
         let (mailbox, letters) = (manager.mailbox(), &mut self.letters);
         manager.run(frames, renderer, &mut |record| {

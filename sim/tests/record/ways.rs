@@ -1,7 +1,7 @@
 //! Whatever ran when a session was recorded, and whatever runs when it is replayed.
 
 use dualframe_sim::blocking::Grain;
-use dualframe_sim::executor::{Entry, ExecutorKind};
+use dualframe_sim::executor::{Entry, ExecutorKind, OnFrame};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::message::{Custom, Message};
 use dualframe_sim::object::{Object, ObjectId};
@@ -114,13 +114,13 @@ fn a_message_of_the_applications_own_is_named() {
     let mut recorder = Recorder::begin(&mut file, &Header::of(&spec), &manager).expect("a start");
     let mailbox = manager.mailbox();
     let mut renderer = NullRenderer::new();
-    let mut run = |frames, on_frame: &mut dyn FnMut(&_)| {
+    let mut run = |frames, on_frame: &mut OnFrame<'_>| {
         let run = recorder.run(&mut manager, frames, &mut renderer, on_frame);
         let written = recorder.write(&manager);
         (run, written)
     };
     assert!(run(70, &mut |_| {}).0.is_ok());
-    let (failed, written) = run(30, &mut |record: &dualframe_sim::executor::FrameRecord| {
+    let (failed, written) = run(30, &mut |record| {
         if record.frame == 80 {
             mailbox.post(ObjectId(PARTICLES as u32 - 1), Message::Custom(Box::new(OfMyOwn)));
         }

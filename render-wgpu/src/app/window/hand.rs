@@ -72,7 +72,7 @@ impl<'a> Marks<'a> {
 
 /// What a person does to the environment: with the mouse and keys, and with a part of the overlay of its
 /// own. Messages to objects are posted to the mailbox that it aims with.
-pub(in crate::app) trait Hand {
+pub(in crate::app) trait Hand: Send {
     /// How the mouse and the keys are used, in a line or two of the overlay.
     const HELP: &'static str;
 

@@ -1,6 +1,6 @@
 //! The window: an environment that a person watches and touches.
 //!
-//! The main thread is worker number 0 and holds the render token. Frames run in short runs; between two
+//! The main thread is worker number 0, and the window stays with it. Frames run in short runs; between two
 //! of them is done what cannot be done while frames run. Events are looked at after every frame.
 //!
 //! What is shown, and what a person can do to it, is a [`Scenario`]; all else is the same for all.
@@ -19,14 +19,13 @@ mod surface;
 mod view;
 
 use std::fs::File;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
 use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_sim::blocking::Grain;
-use dualframe_sim::executor::{ExecutorKind, FrameRecord};
+use dualframe_sim::executor::{ExecutorKind, FrameRecord, OnFrame};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::scene::Scene;
 use dualframe_sim::stages;
@@ -81,7 +80,7 @@ pub(super) trait Scenario {
         manager: VeManager,
         recording: &mut Recording<'_>,
         frames: u64,
-        host: (&mut dyn FnMut(&FrameRecord), Manage<'_>),
+        host: (&mut OnFrame<'_>, Manage<'_>),
     ) -> Result<VeManager, RunError>;
 }
 
@@ -144,7 +143,7 @@ impl<'a, S: Scenario> Session<'a, S> {
         mut recording: Recording<'_>,
         frames: Option<u64>,
         picture: Option<&File>,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<(VeManager, S), RunError> {
         self.view.turn_to(|_| None, manager.mailbox());
         let mut left = frames.unwrap_or(u64::MAX);
@@ -177,7 +176,7 @@ impl<'a, S: Scenario> Session<'a, S> {
     }
 
     fn frames_of_a_run(&self) -> u64 {
-        let frames = self.view.stats.borrow().rate() * RUN_SECONDS;
+        let frames = stats::lock(&self.view.stats).rate() * RUN_SECONDS;
         (frames as u64).clamp(1, RUN_FRAMES)
     }
 
@@ -186,17 +185,17 @@ impl<'a, S: Scenario> Session<'a, S> {
         manager: VeManager,
         recording: &mut Recording<'_>,
         frames: u64,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<VeManager, RunError> {
-        let stats = Rc::clone(&self.view.stats);
+        let stats = Arc::clone(&self.view.stats);
         let mut on_frame = |record: &FrameRecord| {
-            stats.borrow_mut().note(record);
+            stats::lock(&stats).note(record);
             on_frame(record);
         };
         let (settings, timeline) = (self.settings(), Arc::clone(&self.view.timeline));
         let make = move |scene| manage(scene, settings, Some(&timeline));
         let manage = Manage { make: &make, spent: self.spent };
-        let host = (&mut on_frame as &mut dyn FnMut(&FrameRecord), manage);
+        let host = (&mut on_frame as &mut OnFrame<'_>, manage);
         self.scenario.advance(&mut self.view, manager, recording, frames, host)
     }
 

@@ -1,5 +1,6 @@
 //! What the overlay shows of the last frames.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use dualframe_sim::executor::FrameRecord;
@@ -19,6 +20,11 @@ pub(super) struct Stats {
     pub(super) pairs: PairCount,
     /// The last frame.
     pub(super) frame: u64,
+}
+
+/// What the overlay shows and frames are noted in take turns.
+pub(super) fn lock(stats: &Mutex<Stats>) -> MutexGuard<'_, Stats> {
+    stats.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Stats {

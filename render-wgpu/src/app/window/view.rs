@@ -1,9 +1,7 @@
-//! What the token's holder draws with: the window, its events and the pace.
+//! What the main thread draws with: the window, its events and the pace.
 
-use std::cell::RefCell;
 use std::panic;
-use std::rc::Rc;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use dualframe_render_wgpu::camera::Camera;
@@ -17,6 +15,7 @@ use dualframe_sim::object::Object;
 use dualframe_sim::render::Renderer;
 use dualframe_sim::timeline::Timeline;
 use glam::Vec2;
+use send_wrapper::SendWrapper;
 use wgpu::{
     CommandBuffer, Extent3d, Instance, InstanceDescriptor, Texture, TextureDescriptor,
     TextureDimension, TextureUsages,
@@ -32,7 +31,7 @@ use super::input::{Gesture, Input};
 use super::overlay::Overlay;
 use super::pace::Pace;
 use super::paint::OverlayPainter;
-use super::stats::Stats;
+use super::stats::{self, Stats};
 use super::surface::{self, Screen};
 
 /// How far the camera goes round for a mouse that crosses the window's height, in radians.
@@ -42,7 +41,8 @@ const ZOOM: f32 = 0.9;
 
 /// The window as a renderer.
 pub(in crate::app) struct View<H> {
-    event_loop: EventLoop<()>,
+    /// Of the thread that opened the window, which alone may use it.
+    event_loop: SendWrapper<EventLoop<()>>,
     input: Input,
     window: Arc<Window>,
     instance: Instance,
@@ -53,7 +53,7 @@ pub(in crate::app) struct View<H> {
     pub(super) hand: H,
     home: Camera,
     pub(super) controls: Controls,
-    pub(super) stats: Rc<RefCell<Stats>>,
+    pub(super) stats: Arc<Mutex<Stats>>,
     pub(super) timeline: Arc<Timeline>,
     pub(super) mailbox: Mailbox,
     /// Whether the frame being drawn is shown. Displays show fewer frames than are computed.
@@ -122,7 +122,7 @@ impl<H: Hand> View<H> {
             window.current_monitor().and_then(|monitor| monitor.refresh_rate_millihertz());
         let refresh = refresh.map(|rate| f64::from(rate.max(1_000)) * 1e-3);
         Ok(Self {
-            event_loop,
+            event_loop: SendWrapper::new(event_loop),
             input,
             window,
             instance,
@@ -133,7 +133,7 @@ impl<H: Hand> View<H> {
             overlay: Overlay::new(),
             hand: shown.hand,
             controls,
-            stats: Rc::new(RefCell::new(Stats::new())),
+            stats: Arc::new(Mutex::new(Stats::new())),
             timeline: shown.timeline,
             mailbox: Mailbox::new(),
             is_shown: true,
@@ -240,7 +240,7 @@ impl<H: Hand> View<H> {
     /// Time stood still: what was missed is not made up for.
     pub(super) fn interrupt(&mut self) {
         self.pace.interrupt();
-        self.stats.borrow_mut().interrupt();
+        stats::lock(&self.stats).interrupt();
     }
 
     /// Draws what was taken, and the overlay, and presents both.
@@ -278,7 +278,7 @@ impl<H: Hand> View<H> {
                 painter.gpu(),
                 (&self.window, egui),
                 (&mut encoder, texture),
-                |ui| overlay.show(ui, (controls, hand), &camera, &stats.borrow(), timeline),
+                |ui| overlay.show(ui, (controls, hand), &camera, &stats::lock(stats), timeline),
             ),
             None => Vec::new(),
         };
@@ -332,5 +332,9 @@ impl<H: Hand> Renderer for View<H> {
         self.attend(Duration::ZERO);
         self.pace.keep(self.controls.is_real_time);
         self.is_shown = self.pace.shows(self.painter.gpu()) && self.screen.is_visible();
+    }
+
+    fn is_bound(&self) -> bool {
+        true
     }
 }

@@ -1,15 +1,14 @@
 //! oneTBB's `parallel_pipeline`.
 
 use std::sync::Arc;
+use std::thread;
 use std::time::{Duration, Instant};
-
-use send_wrapper::SendWrapper;
 
 use super::super::clock::{Stage, StageSeconds};
 use super::super::engine::{Updating, Worker, check_threads};
 use super::super::parallel_for::ParallelFor;
 use super::super::world::{self, Candidates, Outcome, World};
-use super::super::{Executor, ExecutorError, FrameRecord};
+use super::super::{Executor, ExecutorError, FrameRecord, OnFrame};
 use super::shim::Tbb;
 use crate::block::Block;
 use crate::blocking::Grain;
@@ -28,10 +27,10 @@ use crate::timeline::Timeline;
 /// They cannot be one: an update needs the interactions of blocks that come after it, and a filter
 /// knows only its own token.
 ///
-/// oneTBB runs a serial filter on any thread, and has no filter that is bound to one any more; a
-/// renderer belongs to the calling thread. So the render filter renders when the calling thread comes
-/// by, everything that has been updated so far; otherwise it leaves its block to the next time. What
-/// is left in the end the calling thread renders behind the pipeline.
+/// oneTBB runs a serial filter on any thread, and has no filter that is bound to one any more. Where the renderer
+/// [is bound](Renderer::is_bound) to the calling thread, the render filter renders when that thread comes by,
+/// everything that has been updated so far; otherwise it leaves its block to the next time. What is left in the end
+/// the calling thread renders behind the pipeline.
 pub struct TbbPipelineExecutor {
     world: World,
     arena: Tbb,
@@ -119,17 +118,17 @@ impl TbbPipelineExecutor {
             stages.update(*frame, block, results, workspace, letters, &mut post);
         };
         let mut waiting: Vec<&Block> = Vec::with_capacity(blocks.len());
-        let mut screen = SendWrapper::new(renderer);
+        let (caller, is_bound) = (thread::current().id(), renderer.is_bound());
         self.arena.pipeline(blocks, work, |worker, _, block| {
             waiting.push(block);
-            if screen.valid() {
+            if !is_bound || thread::current().id() == caller {
                 let _timer = workers[worker].clock.time(Stage::Render, *frame);
-                waiting.drain(..).for_each(|block| stages.render(block, &mut **screen));
+                waiting.drain(..).for_each(|block| stages.render(block, renderer));
             }
         });
         let _timer = workers[0].clock.time(Stage::Render, *frame);
-        waiting.drain(..).for_each(|block| stages.render(block, &mut **screen));
-        screen.swap(*frame);
+        waiting.drain(..).for_each(|block| stages.render(block, renderer));
+        renderer.swap(*frame);
         Worker::collect(workers, mail);
     }
 }
@@ -171,7 +170,7 @@ impl Executor for TbbPipelineExecutor {
         &mut self,
         frames: u64,
         renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError> {
         let began = Instant::now();
         self.world.outside.begin(self.frame);

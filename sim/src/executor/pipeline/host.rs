@@ -16,8 +16,8 @@ use super::overflow::Overflow;
 use crate::behavior::{Room, Workspace};
 use crate::block::Block;
 use crate::cost::{Cost, is_timed};
-use crate::executor::FrameRecord;
 use crate::executor::outside::Outside;
+use crate::executor::{FrameRecord, OnFrame};
 use crate::interaction::{ContactBuffer, ContactRecord, Scratch};
 use crate::message::Message;
 use crate::object::ObjectId;
@@ -150,15 +150,15 @@ impl<'s> Host<'s> {
     }
 }
 
-/// What the render token owns.
+/// What a thread needs to render.
 pub(super) struct Screen<'s> {
     pub(super) renderer: &'s mut dyn Renderer,
-    pub(super) on_frame: &'s mut dyn FnMut(&FrameRecord),
+    pub(super) on_frame: &'s mut OnFrame<'s>,
     /// What was counted in the frame being rendered.
     pub(super) pairs: PairCount,
     /// What rendering took of that frame so far, if it is timed.
     pub(super) took: Duration,
-    /// What it takes in a frame.
+    /// What it takes in a frame, if it stays with one thread.
     pub(super) rendering: &'s mut Cost,
     /// Counts the frames that are done.
     pub(super) frame: &'s mut u64,
@@ -168,14 +168,14 @@ impl Screen<'_> {
     /// Lets the renderer work for a frame.
     #[inline]
     fn show(&mut self, frame: u64, work: impl FnOnce(&mut dyn Renderer)) {
-        let began = is_timed(frame).then(Instant::now);
+        let began = (is_timed(frame) && self.renderer.is_bound()).then(Instant::now);
         work(self.renderer);
         self.took += began.map_or(Duration::ZERO, |began| began.elapsed());
     }
 
     /// Notes what a frame's rendering took, once it is swapped.
     fn note(&mut self, frame: u64) {
-        if is_timed(frame) {
+        if is_timed(frame) && self.renderer.is_bound() {
             self.rendering.note(std::mem::take(&mut self.took));
         }
     }

@@ -30,7 +30,7 @@ use self::overflow::Overflow;
 use self::run::{Context, End, Regrouping, Report};
 use self::team::Team;
 use super::outside::Outside;
-use super::{Executor, ExecutorError, FrameRecord, StageSeconds, world};
+use super::{Executor, ExecutorError, FrameRecord, OnFrame, StageSeconds, world};
 use crate::behavior::Room;
 use crate::block::Block;
 use crate::blocking::{Blocking, Grain};
@@ -44,8 +44,8 @@ use crate::scene::Scene;
 use crate::stages::{PairCount, Stages};
 use crate::timeline::Timeline;
 
-/// Advances an environment by the pipeline. The calling thread is worker number 0 and holds the
-/// render token.
+/// Advances an environment by the pipeline. The calling thread is worker number 0; who updates objects renders them,
+/// unless the renderer [is bound](Renderer::is_bound) to the calling thread.
 pub struct PipelineExecutor {
     stages: Stages,
     blocks: Vec<Block>,
@@ -58,7 +58,7 @@ pub struct PipelineExecutor {
     pool: Arc<Pool>,
     team: Team,
     frame: u64,
-    /// What rendering takes in a frame.
+    /// What rendering takes in a frame, where it stays with the calling thread.
     rendering: Cost,
     /// Objects' messages for the next frame.
     mail: Vec<(From, Parcel)>,
@@ -126,7 +126,7 @@ impl PipelineExecutor {
         workers: usize,
         frames: u64,
         renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<End, ExecutorError> {
         let limits = self.tables.limits(self.blocks.len());
         let overflow = Overflow::default();
@@ -181,11 +181,7 @@ impl PipelineExecutor {
     }
 
     /// A frame without objects: it has no last one, by which it would be swapped.
-    fn swap_nothing(
-        &mut self,
-        renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
-    ) {
+    fn swap_nothing(&mut self, renderer: &mut dyn Renderer, on_frame: &mut OnFrame<'_>) {
         renderer.swap(self.frame);
         let (swapped, pairs) = (Instant::now(), PairCount::default());
         on_frame(&FrameRecord { frame: self.frame, swapped, pairs });
@@ -199,7 +195,7 @@ impl Executor for PipelineExecutor {
         &mut self,
         frames: u64,
         renderer: &mut dyn Renderer,
-        on_frame: &mut dyn FnMut(&FrameRecord),
+        on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError> {
         let end = self.frame.saturating_add(frames);
         if let Some(full) = self.failure {

@@ -88,7 +88,7 @@ impl Regrouping<'_> {
     }
 
     /// Forms the blocks anew from where their objects are, if that is due before a frame. `rendering` is what
-    /// that takes in a frame.
+    /// that takes in a frame, if the calling thread alone does it.
     ///
     /// # Errors
     /// How many of them may meet, if the table of those that do is to grow first.
@@ -154,9 +154,14 @@ impl<'s> Context<'s, '_> {
     ) -> thread::Result<End> {
         regrouping.settle(&mut pipeline);
         regrouping.post_mail(self.shared.first_frame, self.shared, &pipeline);
+        let kept = if screen.renderer.is_bound() {
+            Some(screen)
+        } else {
+            pipeline.share(screen).err().map(|(screen, _)| screen)
+        };
         let pipeline = RwLock::new(pipeline);
         let attend = |index| self.attend(index, &pipeline);
-        let batches = || self.batches(frames, &pipeline, &mut regrouping, screen);
+        let batches = || self.batches(frames, &pipeline, &mut regrouping, kept);
         let run = AssertUnwindSafe(|| self.team.work(self.workers, attend, batches));
         let ended = catch_unwind(run);
         let mut rested = pipeline.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -170,7 +175,7 @@ impl<'s> Context<'s, '_> {
         frames: u64,
         pipeline: &RwLock<SimPipeline<'_, 's>>,
         regrouping: &mut Regrouping<'_>,
-        mut screen: Screen<'s>,
+        mut kept: Option<Screen<'s>>,
     ) -> End {
         let dismissal = Dismissal(self.crew);
         let host = Host::new(self.shared, self.team.take_own(0));
@@ -185,8 +190,9 @@ impl<'s> Context<'s, '_> {
             let frame = self.shared.first_frame + done;
             let batch = (FRAMES_PER_BLOCKING - frame % FRAMES_PER_BLOCKING).min(frames - done);
             let Ok(mut resting) = pipeline.write() else { break };
+            let rendering = kept.as_ref().map_or(Cost::default(), |screen| *screen.rendering);
             if let Err(pairs) =
-                regrouping.regroup_before(frame, self.shared, &mut resting, *screen.rendering)
+                regrouping.regroup_before(frame, self.shared, &mut resting, rendering)
             {
                 end = End::Outgrown(Table::Interactions, pairs);
                 break;
@@ -196,7 +202,7 @@ impl<'s> Context<'s, '_> {
             }
             drop(resting);
             self.crew.start();
-            screen = self.lead(&read(pipeline), &host, screen);
+            kept = self.lead(&read(pipeline), &host, kept);
             done += batch;
             let Ok(mut rested) = pipeline.write() else { break };
             end = regrouping.outgrown(self.shared, &mut rested);
@@ -210,21 +216,18 @@ impl<'s> Context<'s, '_> {
         end
     }
 
-    /// The calling thread's part in a batch: it alone renders.
+    /// The calling thread's part in a batch; it alone renders if it has kept the screen.
     fn lead(
         self,
         pipeline: &SimPipeline<'_, 's>,
         host: &Host<'s>,
-        screen: Screen<'s>,
-    ) -> Screen<'s> {
-        match pipeline.token(screen) {
-            Ok(token) => match self.work(0, pipeline, host, Some(token)) {
-                Some(token) => token.into_renderer(),
-                None => unreachable!("a worker gives back the token it was given"),
-            },
+        kept: Option<Screen<'s>>,
+    ) -> Option<Screen<'s>> {
+        match kept.map(|screen| pipeline.token(screen)).transpose() {
+            Ok(token) => self.work(0, pipeline, host, token).map(Token::into_renderer),
             Err((screen, full)) => {
                 self.fail(full);
-                screen
+                Some(screen)
             }
         }
     }

@@ -1,8 +1,7 @@
 //! An operation: what its host does while frames run, and between them.
 
 use std::any::Any;
-use std::cell::RefCell;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::feel::Feel;
 use super::opening::{Opening, Planned};
@@ -42,8 +41,12 @@ pub struct Operation<'c> {
     removed: u64,
 }
 
-/// The hands that haptic loops are linked to. What posts and what watches take turns with them.
-type Feels<'c> = [Option<RefCell<Feel<'c>>>; 2];
+/// The hands that haptic loops are linked to. What posts and what watches take turns with them: neither ever waits.
+type Feels<'c> = [Option<Mutex<Feel<'c>>>; 2];
+
+fn lock<'f, 'c>(feel: &'f Mutex<Feel<'c>>) -> MutexGuard<'f, Feel<'c>> {
+    feel.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 impl<'c> Operation<'c> {
     /// An operation on a head, scripted as far as `step` says; without one nobody moves the hands.
@@ -61,13 +64,16 @@ impl<'c> Operation<'c> {
     /// A hand that there is not is not linked.
     pub fn link(&mut self, hand: usize, end: SimulationEnd<'c>) {
         if let Some(feel) = self.feels.get_mut(hand) {
-            *feel = Some(RefCell::new(Feel::new(end)));
+            *feel = Some(Mutex::new(Feel::new(end)));
         }
     }
 
     /// Takes the haptic loops' ends back: hands are scripted again, and loops feel nothing.
     pub fn unlink(&mut self) -> [Option<SimulationEnd<'c>>; 2] {
-        std::mem::take(&mut self.feels).map(|feel| feel.map(|feel| feel.into_inner().into_end()))
+        let end = |feel: Mutex<Feel<'c>>| {
+            feel.into_inner().unwrap_or_else(PoisonError::into_inner).into_end()
+        };
+        std::mem::take(&mut self.feels).map(|feel| feel.map(end))
     }
 
     /// The frames that the script takes.
@@ -155,7 +161,7 @@ impl Hands<'_, '_> {
     pub fn swapped(&self, frame: u64, mailbox: &Mailbox) {
         self.script.post(frame, self.feels.each_ref().map(Option::is_some), mailbox);
         for (tool, feel) in TOOLS.into_iter().zip(self.feels) {
-            let sample = feel.as_ref().and_then(|feel| feel.borrow_mut().sample());
+            let sample = feel.as_ref().and_then(|feel| lock(feel).sample());
             sample.into_iter().for_each(|sample| mailbox.post(tool, Message::Device(sample)));
         }
     }
@@ -164,7 +170,7 @@ impl Hands<'_, '_> {
     /// none where no loop is linked, or none has said anything yet.
     #[must_use]
     pub fn device(&self, hand: usize) -> Option<ToolState> {
-        self.feels.get(hand)?.as_ref()?.borrow().device().copied()
+        lock(self.feels.get(hand)?.as_ref()?).device().copied()
     }
 }
 
@@ -181,18 +187,22 @@ impl Renderer for Watch<'_, '_> {
         if let Some(hand) = TOOLS.iter().position(|&tool| tool == object.id()) {
             self.score.note(hand, object, |place| self.head.inner_at(place) - place.length());
             if let Some(feel) = &self.feels[hand] {
-                feel.borrow_mut().tool(object);
+                lock(feel).tool(object);
             }
         } else if object.geometry.as_volume().is_some() {
-            self.feels.iter().flatten().for_each(|feel| feel.borrow_mut().bone(object));
+            self.feels.iter().flatten().for_each(|feel| lock(feel).bone(object));
         }
         self.renderer.draw(object);
     }
 
     fn swap(&mut self, frame: u64) {
         self.score.frame();
-        self.feels.iter().flatten().for_each(|feel| feel.borrow_mut().deliver());
+        self.feels.iter().flatten().for_each(|feel| lock(feel).deliver());
         self.renderer.swap(frame);
+    }
+
+    fn is_bound(&self) -> bool {
+        self.renderer.is_bound()
     }
 }
 

@@ -11,7 +11,7 @@ use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::device::link::SimulationEnd;
 use dualframe_sim::device::thread::HapticThread;
-use dualframe_sim::executor::FrameRecord;
+use dualframe_sim::executor::OnFrame;
 use dualframe_sim::manager::VeManager;
 use dualframe_sim::scene::Scene;
 
@@ -105,7 +105,7 @@ impl<'c> Scenario for CraniotomyAtHand<'_, 'c> {
         manager: VeManager,
         recording: &mut Recording<'_>,
         frames: u64,
-        host: (&mut dyn FnMut(&FrameRecord), Manage<'_>),
+        host: (&mut OnFrame<'_>, Manage<'_>),
     ) -> Result<VeManager, RunError> {
         let manager = self.surgery.advance(manager, recording, frames, view, host)?;
         view.hand.is_free = self.is_free(&manager);

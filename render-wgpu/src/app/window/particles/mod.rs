@@ -6,7 +6,7 @@ mod physics;
 use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_sim::blocking::Grain;
-use dualframe_sim::executor::FrameRecord;
+use dualframe_sim::executor::OnFrame;
 use dualframe_sim::manager::VeManager;
 use dualframe_sim::message::Message;
 use dualframe_sim::object::ObjectId;
@@ -97,7 +97,7 @@ impl Scenario for ParticlesAtHand<'_> {
         mut manager: VeManager,
         recording: &mut Recording<'_>,
         frames: u64,
-        (on_frame, _): (&mut dyn FnMut(&FrameRecord), Manage<'_>),
+        (on_frame, _): (&mut OnFrame<'_>, Manage<'_>),
     ) -> Result<VeManager, RunError> {
         recording.run(&mut manager, frames, view, on_frame)?;
         Ok(manager)
