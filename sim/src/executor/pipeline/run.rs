@@ -154,7 +154,8 @@ impl<'s> Context<'s, '_> {
     ) -> thread::Result<End> {
         regrouping.settle(&mut pipeline);
         regrouping.post_mail(self.shared.first_frame, self.shared, &pipeline);
-        let kept = if screen.renderer.is_bound() {
+        // Single objects may be rendered sooner than the renderer is passed on.
+        let kept = if screen.renderer.is_bound() || regrouping.blocking.is_none() {
             Some(screen)
         } else {
             pipeline.share(screen).err().map(|(screen, _)| screen)
