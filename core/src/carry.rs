@@ -17,7 +17,7 @@ pub(crate) trait Outputs {
     fn emit(&mut self, work: Work);
     /// `work` is for whoever comes for it first: this worker cannot do it now, or is not to keep it.
     fn queue(&mut self, work: Work);
-    /// Work that was queued already can be done now, by holders.
+    /// Renderings that were queued already can be done now, by other holders if there are any.
     fn renders_visible(&mut self);
     /// The pipeline is at rest.
     fn all_done(&mut self);
@@ -203,6 +203,14 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         }
     }
 
+    /// Whom queued work of a stage calls: anyone, but holders alone to render, unless the renderer is shared.
+    #[inline]
+    fn calls_for(&mut self, stage: Stage) -> &mut u32 {
+        let is_for_holders = stage == Stage::Render
+            && (!self.pipeline.shared.is_offered() || seeded!(RenderingCallsHolders));
+        if is_for_holders { &mut self.renders } else { &mut self.queued }
+    }
+
     /// Gives away what is carried, and any call that this worker was woken by and has not
     /// answered: whoever called counted on it, and may sleep or have left by now.
     pub(crate) fn leave(&mut self) {
@@ -221,10 +229,7 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         // Whoever still counts this worker among the sleepers has queued its work before this.
         fence(site::FENCE_LEAVE);
         let left = self.pipeline.visible_anywhere(true);
-        // A shared renderer anyone may take.
-        let anyone = self.pipeline.shared.is_offered() && !seeded!(RenderingCallsHolders);
-        let renders = if anyone { &mut self.queued } else { &mut self.renders };
-        *renders += u32::from(left.contains(Stage::Render));
+        *self.calls_for(Stage::Render) += u32::from(left.contains(Stage::Render));
         self.queued += u32::from(left.without(Stage::Render) != Stages::NONE);
         self.announce();
     }
@@ -256,10 +261,7 @@ impl<E: Environment, W: Waiting> Outputs for Carry<'_, '_, E, W> {
     #[inline]
     fn queue(&mut self, work: Work) {
         self.pipeline.push(work);
-        match Stage::of(work) {
-            Stage::Render => self.renders += 1,
-            _ => self.queued += 1,
-        }
+        *self.calls_for(Stage::of(work)) += 1;
     }
 
     fn renders_visible(&mut self) {

@@ -41,7 +41,7 @@ pub trait Environment {
     type Contact: Copy + Send + Sync;
     /// What units may send each other.
     type Message: Send + Sync;
-    /// The graphics context, owned by the render token.
+    /// The graphics context, owned by the render token, or left to all workers.
     type Renderer;
     /// What a callback may fail with.
     type Error: From<TableFull>;

@@ -36,7 +36,7 @@ pub struct Config {
     pub broad_phase: BroadPhase,
     /// How far consecutive frames overlap.
     pub entry: Entry,
-    /// How many workers may render at once; with 0 no frame is ever swapped.
+    /// How many workers may render at once, if the renderer is not shared; with 0 no frame is ever swapped.
     pub tokens: u32,
     /// How many homes the units are shared out to: 1 to [`MOST_HOMES`], the nearest is taken;
     /// usually one for each worker. A worker does the units of its own home first, in the order of their

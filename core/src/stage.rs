@@ -12,7 +12,7 @@ pub enum Stage {
     Interaction = 1,
     /// The unit's behaviour: messages, results of its interactions, integration.
     Update = 2,
-    /// Drawing, by a token's holder only.
+    /// Drawing, by a token's holder, or who has the shared renderer, only.
     Render = 3,
 }
 

@@ -1,4 +1,5 @@
-//! The render token (§5.3): whoever holds it renders and swaps, nobody else.
+//! The render token (§5.3): whoever holds it renders and swaps, nobody else. Or the renderer is left to all workers,
+//! and whoever has taken it does.
 
 use crate::sync::{Atomic, CachePadded, Cell, const_fn, seeded, site};
 

@@ -3,8 +3,9 @@
 use crate::geometry::Geometry;
 use crate::object::Object;
 
-/// A graphics device. One thread has it at a time: it need not be shareable between threads, but goes from one to
-/// the other, to where objects were updated.
+/// A graphics device. One thread has it at a time: it need not be shareable between threads, but may go from one to
+/// the other, to where objects were updated. Such a thread may be one of a rayon pool whose others are all at work:
+/// what is called here, or told of frames, must not wait for rayon.
 pub trait Renderer: Send {
     /// Draws one object of the current frame in the way its [`Drawing`] says. Objects come in no
     /// particular order.
@@ -16,7 +17,7 @@ pub trait Renderer: Send {
     fn swap(&mut self, frame: u64);
 
     /// Whether it has to stay with the thread that lets the environment run, as the event loop of a window has to on
-    /// some systems. Usually not: objects are then drawn by threads that updated them, in whose caches they are.
+    /// some systems. Usually not: objects may then be drawn by threads that updated them, in whose caches they are.
     fn is_bound(&self) -> bool {
         false
     }

@@ -153,7 +153,7 @@ pub struct FrameRecord {
     pub pairs: PairCount,
 }
 
-/// Who is told of every frame once it is swapped, by the thread that swapped it.
+/// Who is told of every frame once it is swapped, by the thread that swapped it: see [`Renderer`] for what that may be.
 pub type OnFrame<'a> = dyn FnMut(&FrameRecord) + Send + 'a;
 
 /// Something that advances an environment frame by frame.

@@ -16,7 +16,7 @@ const MOST_LATE: Duration = Duration::from_millis(250);
 /// A display shows fewer frames than are computed, and an adapter may draw fewer still: the next picture
 /// waits until the last one is drawn, and then for as long again as that took, so that an adapter in software
 /// leaves half of the cores to the objects. Whether it is drawn is asked, not waited for; only to acquire a texture
-/// for a picture and to present it the token's holder may have to wait, for the display or the device.
+/// for a picture and to present it whoever renders may have to wait, for the display or the device.
 pub(super) struct Pace {
     between_shown: Duration,
     next_shown: Instant,

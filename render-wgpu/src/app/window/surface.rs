@@ -44,7 +44,7 @@ impl Screen {
         let srgb = offers.formats.iter().copied().find(TextureFormat::is_srgb);
         let format = srgb.or_else(|| offers.formats.first().copied());
         let format = format.ok_or_else(|| refused("it has no format"))?;
-        // The token's holder must not wait for the display, so that the rest of the frame does not.
+        // Whoever renders must not wait for the display, so that the rest of the frame does not.
         let preferred = [PresentMode::Mailbox, PresentMode::Immediate];
         let present_mode = preferred.into_iter().find(|mode| offers.present_modes.contains(mode));
         let size = window.inner_size();

@@ -45,7 +45,8 @@ use crate::stages::{PairCount, Stages};
 use crate::timeline::Timeline;
 
 /// Advances an environment by the pipeline. The calling thread is worker number 0; who updates objects renders them,
-/// unless the renderer [is bound](Renderer::is_bound) to the calling thread.
+/// unless the renderer [is bound](Renderer::is_bound) to the calling thread, or blocks are single objects
+/// ([`Grain::Pairwise`]): then the calling thread does.
 pub struct PipelineExecutor {
     stages: Stages,
     blocks: Vec<Block>,

@@ -103,7 +103,7 @@ impl Regrouping<'_> {
             self.blocking.as_deref_mut().filter(|_| world::regroups_before(Grain::Spatial, frame));
         let Some(blocking) = due else { return Ok(()) };
         pipeline.objects_mut().for_each(|unit| blocking.drain(&mut unit.block));
-        // Home 0 is the calling thread's, which renders.
+        // Home 0 is the calling thread's, which alone renders if anything is known of that.
         blocking.deal(self.homes, rendering.seconds());
         for (index, unit) in pipeline.objects_mut().enumerate() {
             blocking.fill(index, &mut unit.block);
@@ -117,7 +117,7 @@ impl Regrouping<'_> {
     }
 }
 
-/// Sends everybody home, also when the calling thread unwinds out of a renderer.
+/// Sends everybody home, also when the calling thread unwinds, out of a renderer say.
 struct Dismissal<'s>(&'s Crew);
 
 impl Drop for Dismissal<'_> {
@@ -183,7 +183,7 @@ impl<'s> Context<'s, '_> {
         self.crew.await_present(self.workers - 1, self.pool);
         self.make_room_for(self.workers);
         let (mut done, mut end) = (0, End::Done);
-        while done < frames && self.failure().is_none() {
+        while done < frames && self.failure().is_none() && !self.crew.is_aborted() {
             if self.pool.threads() > self.workers {
                 end = End::Threads;
                 break;
