@@ -92,7 +92,7 @@ faults! {
     LeavesWithRenderer;
     /// A worker sleeps with the shared renderer.
     SleepsWithRenderer;
-    /// Lost wake-up: a worker that leaves a rendering behind calls holders, where anyone could do it.
+    /// Lost wake-up: who queues a rendering, or leaves one behind, calls holders, where anyone could do it.
     RenderingCallsHolders;
     /// The gate is armed again after the frame's updates were let go.
     GateArmedLate;

@@ -5,9 +5,9 @@ use crate::stage::{Stage, Stages};
 /// Where a worker in `current` turns for its next work unit; `None` when it sees none.
 ///
 /// Fig. 8: process the current stage's queue; if it is empty, look one stage ahead and move down
-/// if there is work; else move up, stage by stage. A token's holder, or who has the shared renderer, drains rendering first:
-/// nobody else can, and a chain of carry-overs must not starve it. `visible` holds
-/// [`Stage::Render`] for holders only.
+/// if there is work; else move up, stage by stage. A token's holder, or who has the shared renderer, drains
+/// rendering first: nobody else can, and a chain of carry-overs must not starve it. `visible` holds
+/// [`Stage::Render`] for them only.
 ///
 /// ```
 /// use dualframe_core::{migrate::migrate, stage::{Stage, Stages}};

@@ -1,7 +1,8 @@
 //! The renderer of dualframe's virtual environments, on wgpu.
 //!
-//! One thread has it at a time, and what it does is only what must be single: an object's positions are copied as they are ([`renderer::Painter::add`]), and a frame is
-//! encoded and submitted in a handful of calls. Normals, colours and shadows are made on the device.
+//! One thread has it at a time, and what it does is only what must be single: an object's positions are copied as
+//! they are ([`renderer::Painter::add`]), and a frame is encoded and submitted in a handful of calls. Normals,
+//! colours and shadows are made on the device.
 //!
 //! | module | what it has |
 //! |---|---|
