@@ -2,12 +2,13 @@
 
 use glam::Vec3;
 
+use crate::behavior::batch;
 use crate::geometry::{Bounds, Extent, LANES, Lanes, ROUNDING_MARGIN};
 use crate::interaction::{Member, group_set};
 use crate::object::{Object, ObjectId};
 use crate::simd::{Isa, Kernel, LaneSet, Simd, first_lanes, lanes};
 
-/// One or more objects that go through the stages together, in ascending order of their numbers.
+/// One or more objects that go through the stages together: those that are advanced side by side one after the other.
 ///
 /// What every other block asks first, in every frame, is in its first cache line.
 #[derive(Default)]
@@ -26,7 +27,7 @@ impl Block {
     /// A block of these objects.
     #[must_use]
     pub fn new(mut objects: Vec<Object>) -> Self {
-        objects.sort_unstable_by_key(Object::id);
+        objects.sort_unstable_by_key(batch::order);
         let mut block = Self { objects, ..Self::default() };
         block.refresh();
         block

@@ -128,14 +128,16 @@ fn stages(simd: Simd) -> Stages {
     Stages { simd, gravity: Vec3::new(0.1, -9.81, 0.3), ..common::no_rules() }
 }
 
-/// What becomes of objects in five frames, in blocks of so many.
+/// What becomes of objects in five frames, in blocks of so many; by their numbers.
 fn outcome(objects: Vec<Object>, stages: Stages, size: usize) -> Vec<Object> {
     let mut reference = Reference::new(Scene::new(objects, stages), size);
     for _ in 0..5 {
         reference.step();
     }
-    let snapshots = reference.blocks.iter().flat_map(|block| block.objects());
-    snapshots.map(Object::snapshot).collect()
+    let objects = reference.blocks.iter().flat_map(|block| block.objects());
+    let mut snapshots: Vec<Object> = objects.map(Object::snapshot).collect();
+    snapshots.sort_unstable_by_key(Object::id);
+    snapshots
 }
 
 /// The bits of a body's state after some frames.

@@ -6,7 +6,7 @@ use std::any::Any;
 use std::cmp::Reverse;
 use std::sync::Arc;
 
-use super::abreast::{AdvanceAbreast, WIDEST, seat};
+use super::abreast::{self, AdvanceAbreast, WIDEST, seat};
 use super::spring_kernel::{self, Advance, Springs};
 use super::workspace::SpringWork;
 use super::{Input, MassSpring};
@@ -47,6 +47,18 @@ impl Waiting {
     }
 }
 
+/// The order in which a block has its objects: those that are advanced together one after the other, and each with
+/// what makes as many substeps, as far as they stay as they are.
+pub(crate) fn order(object: &Object) -> impl Ord + use<> {
+    let behavior: &dyn Any = &*object.behavior;
+    let springs = behavior.downcast_ref::<MassSpring>().zip(object.geometry.as_mesh());
+    let kind = springs.map(|(behavior, mesh)| {
+        let topology = Arc::as_ptr(mesh.topology()).addr();
+        (topology, behavior.is_damped(), Reverse(behavior.substeps()))
+    });
+    (kind, object.id())
+}
+
 /// Begins the update of an object that is a mass–spring body and nothing else: its springs then wait
 /// for [`advance`]. `false`, and nothing has happened, for any other object.
 pub(crate) fn begin(object: &mut Object, place: usize, input: &mut Input<'_>) -> bool {
@@ -62,8 +74,7 @@ pub(crate) fn begin(object: &mut Object, place: usize, input: &mut Input<'_>) ->
 
 /// Advances the springs of all bodies that wait.
 pub(crate) fn advance(objects: &mut [Object], work: &mut SpringWork, simd: Simd) {
-    let mut waiting = std::mem::take(&mut work.waiting);
-    waiting.sort_unstable_by_key(|body| (body.kind(), Reverse(body.springs.substeps), body.place));
+    let SpringWork { waiting, alone, abreast } = work;
     for mut alike in waiting.chunk_by(|a, b| a.kind() == b.kind()) {
         while let [first, ..] = alike {
             let Some(mesh) = objects[first.place].geometry.as_mesh_mut() else { break };
@@ -71,14 +82,13 @@ pub(crate) fn advance(objects: &mut [Object], work: &mut SpringWork, simd: Simd)
             let (count, lanes) = together(alike, if is_small { simd.width() } else { HALF });
             let (now, later) = alike.split_at(count);
             if now.len() > 1 {
-                advance_together(now, lanes, objects, work, simd);
+                advance_together(now, lanes, objects, abreast, simd);
             } else {
-                advance_alone(mesh, first.springs, &mut work.alone, simd);
+                advance_alone(mesh, first.springs, alone, simd);
             }
             alike = later;
         }
     }
-    work.waiting = waiting;
 }
 
 /// How many of the first bodies are best advanced together, and in how many lanes, of which there are at most
@@ -121,22 +131,18 @@ fn advance_together(
     bodies: &[Waiting],
     lanes: usize,
     objects: &mut [Object],
-    work: &mut SpringWork,
+    nodes: &mut abreast::Nodes,
     simd: Simd,
 ) {
-    let SpringWork { abreast: nodes, indices, .. } = work;
-    indices.clear();
-    indices.resize(objects.len(), None);
-    for (index, body) in bodies.iter().enumerate() {
-        indices[body.place] = Some(index as u8);
-    }
+    let mut objects = objects.iter_mut();
+    let mut next = 0;
     let mut seated = [const { [const { None }; WIDEST] }; 2];
-    for (object, &mut index) in objects.iter_mut().zip(indices) {
-        if let Some(index) = index.map(usize::from)
-            && let Some(mesh) = object.geometry.as_mesh_mut()
-        {
+    for (index, body) in bodies.iter().enumerate() {
+        let object = objects.nth(body.place - next);
+        next = body.place + 1;
+        if let Some(mesh) = object.and_then(|object| object.geometry.as_mesh_mut()) {
             let (turn, lane) = seat(index, lanes);
-            seated[turn][lane] = Some((mesh.kernel_parts(), bodies[index].springs));
+            seated[turn][lane] = Some((mesh.kernel_parts(), body.springs));
         }
     }
     simd.run(AdvanceAbreast { bodies: seated, nodes });

@@ -102,6 +102,11 @@ impl MassSpring {
         between.sum::<f64>() + to_center.sum::<f64>()
     }
 
+    /// Whether its springs are damped.
+    pub(super) fn is_damped(&self) -> bool {
+        self.damping > 0.0
+    }
+
     /// The number of substeps a frame.
     #[must_use]
     pub fn substeps(&self) -> u32 {

@@ -24,10 +24,8 @@ pub struct Workspace {
 pub(crate) struct SpringWork {
     pub(super) alone: spring_kernel::Nodes,
     pub(super) abreast: abreast::Nodes,
-    /// Bodies whose springs are left to be advanced.
+    /// Bodies whose springs are left to be advanced, as they come in their block.
     pub(crate) waiting: Vec<batch::Waiting>,
-    /// For each object of a block its index among those that are advanced together.
-    pub(super) indices: Vec<Option<u8>>,
 }
 
 /// How much room the updates of some blocks need.
@@ -70,7 +68,6 @@ impl Workspace {
         let Self { received, springs } = &mut workspace;
         received.reserve(room.objects, room.objects * TOUCHED_PER_OBJECT);
         springs.waiting.reserve(room.objects);
-        springs.indices.reserve(room.objects);
         springs.alone.reserve(room.nodes);
         springs.abreast.reserve(room.abreast);
         workspace

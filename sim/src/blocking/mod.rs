@@ -5,6 +5,7 @@ mod split;
 use thiserror::Error;
 
 use self::split::{Key, Members};
+use crate::behavior::batch;
 use crate::block::Block;
 use crate::object::Object;
 use crate::simd::HALF;
@@ -190,10 +191,13 @@ impl Blocking {
 
     /// Puts the objects of the block number `index` into it.
     pub fn fill(&mut self, index: usize, block: &mut Block) {
-        let Some(Members { ids, .. }) = self.members.get(index) else { return };
-        block.reserve(ids.len().max(self.room));
-        for &id in ids {
-            block.objects.extend(self.objects.get_mut(id as usize).and_then(Option::take));
+        let Self { objects, members, room, .. } = self;
+        let Some(Members { ids, .. }) = members.get_mut(index) else { return };
+        block.reserve(ids.len().max(*room));
+        let order = |&id: &u32| objects.get(id as usize).and_then(Option::as_ref).map(batch::order);
+        ids.sort_unstable_by_key(order);
+        for &mut id in ids {
+            block.objects.extend(objects.get_mut(id as usize).and_then(Option::take));
         }
         block.refresh();
     }

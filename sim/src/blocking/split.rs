@@ -106,7 +106,6 @@ pub(super) fn evenly(keys: &mut [Key], members: &mut [Members], home: u32, share
         [only] => {
             only.ids.clear();
             only.ids.extend(keys.iter().map(|key| key.id));
-            only.ids.sort_unstable();
             only.cost = cost(keys);
             only.home = home;
         }
