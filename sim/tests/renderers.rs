@@ -3,14 +3,20 @@
 mod common;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Condvar, Mutex};
 use std::thread::{self, ThreadId};
+use std::time::Duration;
 
-use common::particles;
+use common::{no_rules, particles};
+use dualframe_sim::behavior::{Behavior, Input};
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::ExecutorKind;
+use dualframe_sim::geometry::{Geometry, Rigid};
 use dualframe_sim::manager::{Settings, VeManager};
-use dualframe_sim::object::{Object, ObjectId};
+use dualframe_sim::object::{Group, Object, ObjectId};
 use dualframe_sim::render::Renderer;
+use dualframe_sim::scene::Scene;
+use glam::Vec3;
 
 /// More than have a block each.
 const PARTICLES: usize = 100;
@@ -91,5 +97,73 @@ fn a_renderers_panic_comes_back_to_the_caller() {
             let text = panic.downcast_ref::<String>().expect("a message");
             assert!(text.contains("the device is lost"), "{executor:?}: {text}");
         }
+    }
+}
+
+/// Whether something was drawn elsewhere than on the calling thread.
+#[derive(Default)]
+struct Elsewhere {
+    drawn: Mutex<bool>,
+    news: Condvar,
+}
+
+/// How long the calling thread waits for it; usually a minute, more than a slow machine needs.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Its update takes the calling thread until something was drawn elsewhere.
+struct Waits(ThreadId, Arc<Elsewhere>);
+
+impl Behavior for Waits {
+    fn update(&mut self, _: &mut Geometry, _: &mut Input<'_>) {
+        let Self(caller, elsewhere) = self;
+        if thread::current().id() == *caller {
+            let drawn = elsewhere.drawn.lock().expect("no poison");
+            let waited = elsewhere.news.wait_timeout_while(drawn, PATIENCE, |drawn| !*drawn);
+            drop(waited.expect("no poison"));
+        }
+    }
+}
+
+/// Says that something was drawn elsewhere, and may panic then.
+struct Tells {
+    caller: ThreadId,
+    elsewhere: Arc<Elsewhere>,
+    fails: bool,
+}
+
+impl Renderer for Tells {
+    fn draw(&mut self, _: &Object) {
+        if thread::current().id() != self.caller {
+            *self.elsewhere.drawn.lock().expect("no poison") = true;
+            self.elsewhere.news.notify_all();
+            assert!(!self.fails, "the device is lost");
+        }
+    }
+
+    fn swap(&mut self, _: u64) {}
+}
+
+#[test]
+fn the_pipeline_renders_on_another_thread_while_the_callers_is_busy() {
+    for fails in [false, true] {
+        let (caller, elsewhere) = (thread::current().id(), Arc::new(Elsewhere::default()));
+        let object = |id| {
+            let wall = Geometry::Rigid(Rigid::wall(Vec3::ZERO, Vec3::Y));
+            Object::new(ObjectId(id), Group(0), wall, Waits(caller, Arc::clone(&elsewhere)))
+        };
+        let scene = Scene::new((0..8).map(object).collect(), no_rules());
+        let executor = ExecutorKind::Pipeline;
+        let settings = Settings { executor, threads: 2, ..Settings::default() };
+        let mut manager = VeManager::new(scene, settings).expect("all of it is allowed");
+        let mut renderer = Tells { caller, elsewhere: Arc::clone(&elsewhere), fails };
+        let run = AssertUnwindSafe(|| manager.run(4, &mut renderer, &mut |_| ()));
+        match catch_unwind(run) {
+            Ok(outcome) => assert!(outcome.is_ok() && !fails, "{outcome:?}"),
+            Err(panic) => {
+                let text = panic.downcast_ref::<&str>().expect("a message");
+                assert!(fails && text.contains("the device is lost"), "{text}");
+            }
+        }
+        assert!(*elsewhere.drawn.lock().expect("no poison"));
     }
 }

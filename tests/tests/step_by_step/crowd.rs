@@ -22,6 +22,8 @@ pub(crate) struct Crowd {
     pub(crate) near: bool,
     /// Whether each unit writes itself two letters in each frame; otherwise letters are left unread.
     pub(crate) writes: bool,
+    /// Whether rendering panics.
+    pub(crate) breaks: bool,
 }
 
 /// What a unit found in its last update: whom it met, and its letters.
@@ -72,6 +74,7 @@ impl Environment for Crowd {
     }
 
     fn render(&self, _: UnitId, _: Frame, _: &Found, (): &mut ()) -> Result<(), TableFull> {
+        assert!(!self.breaks, "on purpose");
         Ok(())
     }
 
@@ -80,8 +83,10 @@ impl Environment for Crowd {
     }
 }
 
-pub(crate) const NEAR: Crowd = Crowd { near: true, writes: false };
-pub(crate) const FAR: Crowd = Crowd { near: false, writes: false };
+pub(crate) const NEAR: Crowd = Crowd { near: true, writes: false, breaks: false };
+pub(crate) const FAR: Crowd = Crowd { near: false, ..NEAR };
+/// Far from each other, and rendering panics.
+pub(crate) const BREAKS: Crowd = Crowd { breaks: true, ..FAR };
 
 /// Notes on whose bell somebody was to sleep, and how many were to be woken; `true` is the holders'.
 #[derive(Default)]

@@ -4,6 +4,7 @@
 
 mod crowd;
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Barrier;
 
 use dualframe_core::frame::Frame;
@@ -14,8 +15,8 @@ use dualframe_core::worker::Step;
 use dualframe_tests::watchdog;
 
 use crowd::{
-    Crowd, ENTERED, FAR, IDLE, INTERACTED, Log, NEAR, Notes, RENDERED, UPDATED, alone, finish,
-    hold, units, with, with_notes,
+    BREAKS, Crowd, ENTERED, FAR, IDLE, INTERACTED, Log, NEAR, Notes, RENDERED, UPDATED, alone,
+    finish, hold, units, with, with_notes,
 };
 
 #[test]
@@ -227,6 +228,24 @@ fn whoever_updates_renders_if_the_shared_renderer_is_free() {
 }
 
 #[test]
+fn nobody_is_given_a_renderer_whose_rendering_panicked() {
+    with(2, 2, 1, |mut pipeline, _| {
+        pipeline.run(1).expect("at rest");
+        pipeline.share(()).expect("no token is out");
+        let (mut a, mut b) = (pipeline.worker_at(0), pipeline.worker_at(1));
+        assert_eq!([a.step(&FAR), b.step(&FAR)], [ENTERED, ENTERED]);
+        assert_eq!(a.step(&FAR), UPDATED);
+        assert!(catch_unwind(AssertUnwindSafe(|| a.step(&BREAKS))).is_err());
+        assert_eq!([b.step(&FAR), b.step(&FAR)], [UPDATED, IDLE], "its rendering is queued");
+        drop(a);
+        assert_eq!(b.step(&FAR), IDLE, "though nobody has the renderer");
+        assert!(!b.has_cause_to_wake());
+        drop(b);
+        assert_eq!(pipeline.take_back(), Some(()), "it is its owner's again");
+    });
+}
+
+#[test]
 fn nobody_wakes_without_cause() {
     with(1, 1, 1, |mut pipeline, notes| {
         let worker = pipeline.worker();
@@ -377,7 +396,7 @@ fn interactions_come_in_pair_order() {
 fn letters_of_one_update_keep_their_order() {
     with(1, 1, 1, |mut pipeline, _| {
         pipeline.run(3).expect("at rest");
-        finish(&pipeline, &Crowd { near: false, writes: true });
+        finish(&pipeline, &Crowd { writes: true, ..FAR });
         let from = |sequence| From { sender: 0, sequence };
         let found = pipeline.objects_mut().next().map(|found| found.read.as_slice());
         assert_eq!(found, Some(&[(from(0), "first"), (from(1), "second")][..]));
