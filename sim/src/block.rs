@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::behavior::batch;
+use crate::behavior::batch::Order;
 use crate::geometry::{Bounds, Extent, LANES, Lanes, ROUNDING_MARGIN};
 use crate::interaction::{Member, group_set};
 use crate::object::{Object, ObjectId};
@@ -27,7 +27,7 @@ impl Block {
     /// A block of these objects.
     #[must_use]
     pub fn new(mut objects: Vec<Object>) -> Self {
-        objects.sort_unstable_by_key(batch::order);
+        objects.sort_by_cached_key(Order::of);
         let mut block = Self { objects, ..Self::default() };
         block.refresh();
         block

@@ -193,7 +193,8 @@ fn damping_is_changed_by_a_message() {
 
 #[test]
 fn the_same_for_every_executor() {
-    let scene = || particles(40, true, true);
+    // More than have a block each.
+    let scene = || particles(100, true, true);
     let outcome = |executor: &mut dyn Executor| {
         let mailbox = executor.mailbox().clone();
         let mut renderer = dualframe_sim::render::NullRenderer::new();
@@ -201,9 +202,9 @@ fn the_same_for_every_executor() {
             let frame = record.frame as u32;
             let target = [0.02 * frame as f32, 0.5, -0.3];
             mailbox.post(ObjectId(3), Message::Pull { node: 5, target, stiffness: 80.0 });
-            let one = ObjectId(frame % 40);
+            let one = ObjectId(frame % 100);
             mailbox.post(one, Message::Pull { node: frame % 42, target, stiffness: 1e9 });
-            mailbox.post(ObjectId((frame + 20) % 40), Message::Release);
+            mailbox.post(ObjectId((frame + 20) % 100), Message::Release);
             // Damped bodies and others are not advanced together.
             mailbox.post(one, Message::Damping(0.01 * (frame % 3) as f32));
         });

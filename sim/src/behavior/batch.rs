@@ -11,7 +11,7 @@ use super::spring_kernel::{self, Advance, Springs};
 use super::workspace::SpringWork;
 use super::{Input, MassSpring};
 use crate::geometry::Mesh;
-use crate::object::Object;
+use crate::object::{Object, ObjectId};
 use crate::simd::{HALF, Simd};
 
 /// The bodies that must move on average for a step side by side to cost less than their steps one by
@@ -49,14 +49,23 @@ impl Waiting {
 
 /// The order in which a block has its objects: those that are advanced together one after the other, and each with
 /// what makes as many substeps, as far as they stay as they are.
-pub(crate) fn order(object: &Object) -> impl Ord + use<> {
-    let behavior: &dyn Any = &*object.behavior;
-    let springs = behavior.downcast_ref::<MassSpring>().zip(object.geometry.as_mesh());
-    let kind = springs.map(|(behavior, mesh)| {
-        let topology = Arc::as_ptr(mesh.topology()).addr();
-        (topology, behavior.is_damped(), Reverse(behavior.substeps()))
-    });
-    (kind, object.id())
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Order {
+    /// Where a body's topology is in memory, whether it is damped, and its substeps.
+    springs: Option<(usize, bool, Reverse<u32>)>,
+    pub(crate) id: ObjectId,
+}
+
+impl Order {
+    pub(crate) fn of(object: &Object) -> Self {
+        let behavior: &dyn Any = &*object.behavior;
+        let body = behavior.downcast_ref::<MassSpring>().zip(object.geometry.as_mesh());
+        let springs = body.map(|(behavior, mesh)| {
+            let topology = Arc::as_ptr(mesh.topology()).addr();
+            (topology, behavior.is_damped(), Reverse(behavior.substeps()))
+        });
+        Self { springs, id: object.id() }
+    }
 }
 
 /// Begins the update of an object that is a mass–spring body and nothing else: its springs then wait

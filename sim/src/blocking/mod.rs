@@ -5,7 +5,7 @@ mod split;
 use thiserror::Error;
 
 use self::split::{Key, Members};
-use crate::behavior::batch;
+use crate::behavior::batch::Order;
 use crate::block::Block;
 use crate::object::Object;
 use crate::simd::HALF;
@@ -72,6 +72,8 @@ pub struct Blocking {
     moving: Vec<u32>,
     members: Vec<Members>,
     keys: Vec<Key>,
+    /// Of the block that is being filled.
+    order: Vec<Order>,
     moving_blocks: usize,
     /// Moving objects are shared out so many at a time: as many as are advanced side by side, or one by one.
     share: usize,
@@ -142,7 +144,9 @@ impl Blocking {
         let mut blocks = Vec::new();
         blocks.resize_with(members.len(), Block::default);
         let keys = Vec::with_capacity(moving.len());
-        let mut blocking = Self { objects, moving, members, keys, moving_blocks, share, room };
+        let order = Vec::with_capacity(room);
+        let mut blocking =
+            Self { objects, moving, members, keys, order, moving_blocks, share, room };
         blocking.split();
         for (index, block) in blocks.iter_mut().enumerate() {
             blocking.fill(index, block);
@@ -191,13 +195,15 @@ impl Blocking {
 
     /// Puts the objects of the block number `index` into it.
     pub fn fill(&mut self, index: usize, block: &mut Block) {
-        let Self { objects, members, room, .. } = self;
-        let Some(Members { ids, .. }) = members.get_mut(index) else { return };
+        let Self { objects, members, order, room, .. } = self;
+        let Some(Members { ids, .. }) = members.get(index) else { return };
         block.reserve(ids.len().max(*room));
-        let order = |&id: &u32| objects.get(id as usize).and_then(Option::as_ref).map(batch::order);
-        ids.sort_unstable_by_key(order);
-        for &mut id in ids {
-            block.objects.extend(objects.get_mut(id as usize).and_then(Option::take));
+        order.clear();
+        let there = |&id: &u32| objects.get(id as usize)?.as_ref().map(Order::of);
+        order.extend(ids.iter().filter_map(there));
+        order.sort_unstable();
+        for Order { id, .. } in order {
+            block.objects.extend(objects.get_mut(id.0 as usize).and_then(Option::take));
         }
         block.refresh();
     }
