@@ -1,16 +1,24 @@
 //! What drawing costs whoever holds the token, and executors with every frame drawn.
 //!
-//! `cargo bench -p dualframe-render-wgpu --bench drawing`; `-- --test` for a short run.
+//! `cargo bench -p dualframe-render-wgpu --features native-peers --bench drawing`; `-- --test` for a short run. An
+//! adapter in software draws on the cores that the executors work on. With `WGPU_BACKEND=noop WGPU_NOOP_BACKEND=1` in
+//! the environment there is a device that takes no time of them, as if it were a graphics card, and draws nothing.
 
 use std::alloc::System;
+use std::cell::Cell;
 use std::error::Error;
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
+use clap::Parser;
 use dualframe_render_wgpu::gpu::Gpu;
 use dualframe_render_wgpu::look::{Look, Quality};
+use dualframe_render_wgpu::picture::Picture;
 use dualframe_render_wgpu::renderer::{OFFSCREEN_FORMAT, Offscreen, Painter};
 use dualframe_sim::executor::ExecutorKind;
+use dualframe_sim::experiment::calibrator::Calibrator;
+use dualframe_sim::experiment::machine::Machine;
+use dualframe_sim::experiment::race::{Runner, WARM_UP};
+use dualframe_sim::experiment::timing::{Contender, Series};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::object::Object;
 use dualframe_sim::render::{NullRenderer, Renderer};
@@ -24,27 +32,44 @@ static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
 /// Pictures' width and height, in pixels: small, so that an adapter in software leaves time to measure.
 const SIZE: (u32, u32) = (320, 180);
-/// How long threads may spin on after a run.
-const SETTLE: Duration = Duration::from_millis(30);
 
-/// How much is measured.
-struct Plan {
+/// What is measured.
+#[derive(Parser)]
+struct Arguments {
+    /// Rounds in which the executors take turns.
+    #[arg(long, value_name = "N", default_value_t = 15)]
     rounds: usize,
-    frames: u64,
-    objects: &'static [usize],
+    /// Numbers of particles.
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [100, 300, 1_000])]
+    objects: Vec<usize>,
+    /// Threads of the parallel executors.
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    threads: usize,
+    /// See only whether it runs.
+    #[arg(long)]
+    test: bool,
+    /// What cargo adds.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+/// How a drawn run ended: the objects' state, and the last frame's picture.
+#[derive(Clone, PartialEq)]
+struct End {
+    state: u64,
+    picture: Picture,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let is_test = std::env::args().any(|argument| argument == "--test");
-    let plan = match is_test {
-        true => Plan { rounds: 1, frames: 4, objects: &[20] },
-        false => Plan { rounds: 9, frames: 40, objects: &[100, 300, 1_000] },
-    };
+    let mut arguments = Arguments::parse();
+    if arguments.test {
+        arguments = Arguments { rounds: 1, objects: vec![20], ..arguments };
+    }
     let gpu = Gpu::new(None)?;
-    println!("{}, {} by {} pixels", gpu.title(), SIZE.0, SIZE.1);
-    token_time(gpu, if is_test { 20 } else { 500 }, plan.frames)?;
-    for &objects in plan.objects {
-        executors(&plan, objects)?;
+    println!("{}; {}, {} by {} pixels", Machine::this(), gpu.title(), SIZE.0, SIZE.1);
+    token_time(gpu, if arguments.test { 20 } else { 500 })?;
+    for &objects in &arguments.objects {
+        executors(&arguments, objects)?;
     }
     Ok(())
 }
@@ -55,7 +80,8 @@ fn median(times: &mut [f64]) -> f64 {
 }
 
 /// Milliseconds of a frame under the token, beside those of a serial frame without drawing.
-fn token_time(gpu: Gpu, objects: usize, frames: u64) -> Result<(), Box<dyn Error>> {
+fn token_time(gpu: Gpu, objects: usize) -> Result<(), Box<dyn Error>> {
+    let frames = 40;
     let scene = ParticleScene::new(objects);
     let look = Look::room(scene.room(), Quality::Fast);
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -119,42 +145,57 @@ impl Renderer for Add<'_> {
 }
 
 /// Frames per second of each executor with every frame drawn.
-fn executors(plan: &Plan, objects: usize) -> Result<(), Box<dyn Error>> {
-    let kinds = [
-        ExecutorKind::Pipeline,
-        ExecutorKind::RayonOverlapped,
-        ExecutorKind::Rayon,
-        ExecutorKind::Static,
-        ExecutorKind::Serial,
-    ];
-    let scene = ParticleScene::new(objects);
-    let mut rates = vec![Vec::new(); kinds.len()];
-    let mut states = Vec::new();
-    for round in 0..plan.rounds {
-        for turn in 0..kinds.len() {
-            let index = (round + turn) % kinds.len();
-            let settings = Settings { executor: kinds[index], ..Settings::default() };
-            let mut manager = VeManager::new(scene.build()?, settings)?;
-            let look = Look::room(scene.room(), Quality::Fast);
-            let mut offscreen = Offscreen::new(Gpu::new(None)?, look, SIZE)?;
-            manager.run(plan.frames / 4, &mut offscreen, &mut |_| ())?;
-            let began = Instant::now();
-            manager.run(plan.frames, &mut offscreen, &mut |_| ())?;
-            rates[index].push(plan.frames as f64 / began.elapsed().as_secs_f64());
-            states.push((manager.state_hash(), offscreen.picture()?));
-            drop((manager, offscreen));
-            thread::sleep(SETTLE);
-        }
-        if states.iter().any(|state| *state != states[0]) {
-            return Err("executors differ in their states or pictures".into());
-        }
-        states.truncate(1);
-    }
-    println!("{objects} objects, every frame drawn:   frames/s   pipeline over it");
-    for (kind, own) in kinds.iter().zip(&rates) {
-        let mut ratios: Vec<f64> = rates[0].iter().zip(own).map(|(ours, own)| ours / own).collect();
-        let rate = median(&mut own.clone());
-        println!("{:>28} {rate:14.1} {:18.3}", kind.name(), median(&mut ratios));
+fn executors(arguments: &Arguments, objects: usize) -> Result<(), Box<dyn Error>> {
+    let &Arguments { rounds, threads, test, .. } = arguments;
+    let frames = if test { 3 } else { (60_000 / objects.max(1)).max(20) as u64 };
+    let runners: Vec<Runner> = Runner::parallel(threads).chain([Runner::SERIAL]).collect();
+    let expected = Cell::new(None);
+    let contender = |&runner: &Runner| {
+        let expected = &expected;
+        let run = Box::new(move || drawn(runner, objects, frames, expected));
+        Contender { label: runner.label(), spins: true, run }
+    };
+    let mut contenders: Vec<Contender<'_, Box<dyn Error>>> =
+        runners.iter().map(contender).collect();
+    let calibrator = Calibrator::default();
+    let phase = &mut || calibrator.phase();
+    let series = Series::measure(&mut contenders, rounds, phase, &mut || ())?;
+    let (marked, which) = (series.marked(), series.best_rounds());
+    println!("{objects} objects, every frame drawn, {marked} of {rounds} rounds marked:");
+    println!("{:>24}   frames/s   pipeline over it", "");
+    for (index, label) in series.labels().iter().enumerate() {
+        let seconds = series.seconds(which, index).map_or(f64::NAN, |seconds| seconds.median);
+        let over = series.ratio(which, index, 0).map_or(f64::NAN, |ratio| ratio.median);
+        println!("{label:>24} {:10.1} {over:18.3}", frames as f64 / seconds);
     }
     Ok(())
+}
+
+/// Seconds of a run with every frame drawn, which must end as the others do.
+fn drawn(
+    runner: Runner,
+    objects: usize,
+    frames: u64,
+    expected: &Cell<Option<End>>,
+) -> Result<f64, Box<dyn Error>> {
+    let scene = ParticleScene::new(objects);
+    let Runner { executor, threads } = runner;
+    let settings = Settings { executor, threads, ..Settings::default() };
+    let mut manager = VeManager::new(scene.build()?, settings)?;
+    let look = Look::room(scene.room(), Quality::Fast);
+    let mut offscreen = Offscreen::new(Gpu::new(None)?, look, SIZE)?;
+    manager.run(WARM_UP, &mut offscreen, &mut |_| ())?;
+    let began = Instant::now();
+    manager.run(frames, &mut offscreen, &mut |_| ())?;
+    let seconds = began.elapsed().as_secs_f64();
+    let end = End { state: manager.state_hash(), picture: offscreen.picture()? };
+    match expected.take() {
+        Some(other) if other != end => {
+            Err(format!("{} ended in another state or picture", runner.label()).into())
+        }
+        _ => {
+            expected.set(Some(end));
+            Ok(seconds)
+        }
+    }
 }

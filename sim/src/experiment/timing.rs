@@ -11,14 +11,14 @@ use super::statistics::Quartiles;
 /// the parallel frameworks' threads spin before they sleep.
 const AFTER_SPINNING: Duration = Duration::from_millis(30);
 
-/// Something that is timed.
-pub struct Contender<'a> {
+/// Something that is timed, and what it fails with.
+pub struct Contender<'a, E = ExperimentError> {
     /// What it is called.
     pub label: String,
     /// Whether its threads may go on spinning after a run.
     pub spins: bool,
     /// Runs it once and says how many seconds the timed part took.
-    pub run: Box<dyn FnMut() -> Result<f64, ExperimentError> + 'a>,
+    pub run: Box<dyn FnMut() -> Result<f64, E> + 'a>,
 }
 
 /// One round: every contender once.
@@ -54,12 +54,12 @@ impl Series {
     ///
     /// # Errors
     /// Whatever a contender fails with.
-    pub fn measure(
-        contenders: &mut [Contender<'_>],
+    pub fn measure<E>(
+        contenders: &mut [Contender<'_, E>],
         rounds: usize,
         phase: &mut dyn FnMut() -> Phase,
         done: &mut dyn FnMut(),
-    ) -> Result<Self, ExperimentError> {
+    ) -> Result<Self, E> {
         let labels = contenders.iter().map(|contender| contender.label.clone()).collect();
         let count = contenders.len();
         let mut phases = vec![phase()];
