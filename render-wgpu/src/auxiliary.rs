@@ -151,11 +151,21 @@ impl Units {
         if self.encoded.is_empty() {
             return;
         }
-        // A failure is noted by the device's own callbacks.
-        let _ = context.gpu.device.poll(PollType::Poll);
+        // With the next frame a failure ends them all.
+        let _ = context.gpu.poll(PollType::Poll);
         for encoded in self.encoded.extract_if(.., |encoded| encoded.is_done()) {
             encoded.finish(context);
         }
+    }
+
+    /// Ends all of them: those that were encoded are told why, the others are dropped, and so is what they would
+    /// have answered by.
+    pub(crate) fn refuse(&mut self, context: &Context<'_>, failure: &GraphicsError) {
+        for Encoded { unit, .. } in self.encoded.drain(..) {
+            unit.finish(context, Err(failure.clone()));
+        }
+        self.for_frame.clear();
+        self.receiver.try_iter().for_each(drop);
     }
 
     /// Runs what waits and needs no frame, all at once, and waits for the results.
@@ -176,8 +186,8 @@ impl Units {
         let encode = |unit| encode(unit, context, &mut encoder);
         let encoded: Vec<_> = now.into_iter().filter_map(encode).collect();
         queue.submit([encoder.finish()]);
-        // A failure is noted by the device's own callbacks.
-        let _ = device.poll(PollType::wait_indefinitely());
+        // A failure is each unit's.
+        let _ = context.gpu.poll(PollType::wait_indefinitely());
         for encoded in encoded {
             encoded.finish(context);
         }

@@ -1,10 +1,12 @@
 //! The graphics device and how it is chosen.
 
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use wgpu::{
     Adapter, AdapterInfo, Backends, Device, DeviceDescriptor, DownlevelFlags, Instance,
-    InstanceDescriptor, PowerPreference, Queue, RequestAdapterOptions, Surface,
+    InstanceDescriptor, PollType, PowerPreference, Queue, RequestAdapterOptions, Surface,
 };
 
 use crate::error::GraphicsError;
@@ -22,8 +24,8 @@ pub struct Gpu {
 impl Gpu {
     /// A device that draws without a window.
     ///
-    /// `name` is a part of the adapter's name in any case, as is the environment's `WGPU_ADAPTER_NAME`
-    /// if there is none; without either the system's preferred adapter is taken, by `WGPU_POWER_PREF`
+    /// `name` is a part of the adapter's [title](Self::title) in any case, as is the environment's
+    /// `WGPU_ADAPTER_NAME` if there is none; without either the system's preferred adapter is taken, by `WGPU_POWER_PREF`
     /// (`low` or `high`; high if not set). `WGPU_BACKEND` (`vulkan`, `gl`, `metal`, `dx12`) narrows the
     /// choice.
     ///
@@ -77,7 +79,7 @@ impl Gpu {
         &self.adapter
     }
 
-    /// The adapter's name, kind and driver in one line.
+    /// The adapter's name and backend in one line.
     #[must_use]
     pub fn title(&self) -> String {
         title(&self.adapter.get_info())
@@ -96,6 +98,25 @@ impl Gpu {
         failure.as_ref().map(|reason| GraphicsError::Lost { reason: reason.clone() })
     }
 
+    /// Lets the device get on with what was submitted, or waits for it. Unlike wgpu's own it does not panic where the
+    /// driver has lost the device.
+    ///
+    /// # Errors
+    /// The device has failed, now or before.
+    pub fn poll(&self, how: PollType) -> Result<(), GraphicsError> {
+        if let Some(failure) = self.failure() {
+            return Err(failure);
+        }
+        let polled = catch_unwind(AssertUnwindSafe(|| self.device.poll(how)));
+        let reason = match polled {
+            Ok(Ok(_)) => return Ok(()),
+            Ok(Err(error)) => one_line(&error),
+            Err(panic) => one_line(&words(&*panic)),
+        };
+        note(&self.failure, reason.clone());
+        Err(self.failure().unwrap_or(GraphicsError::Lost { reason }))
+    }
+
     /// The greatest width and height of a picture, in pixels.
     #[must_use]
     pub fn most_pixels(&self) -> u32 {
@@ -104,10 +125,18 @@ impl Gpu {
 }
 
 /// Keeps the first failure: the later ones follow from it.
+fn note(failure: &Mutex<Option<String>>, reason: String) {
+    failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(reason);
+}
+
+/// What a panic says.
+fn words(panic: &(dyn Any + Send)) -> &str {
+    let owned = panic.downcast_ref::<String>().map(String::as_str);
+    owned.or_else(|| panic.downcast_ref().copied()).unwrap_or("it panicked")
+}
+
+/// Has the device note what goes wrong.
 fn note_failures(device: &Device, failure: &Arc<Mutex<Option<String>>>) {
-    let note = |failure: &Mutex<Option<String>>, reason: String| {
-        failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(reason);
-    };
     let lost = Arc::clone(failure);
     device.set_device_lost_callback(move |_, reason| note(&lost, one_line(&reason)));
     let wrong = Arc::clone(failure);
@@ -149,4 +178,34 @@ fn title(info: &AdapterInfo) -> String {
 pub(crate) fn one_line(error: &impl ToString) -> String {
     let text = error.to_string();
     text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use wgpu::{BackendOptions, NoopBackendOptions};
+
+    use super::*;
+
+    /// A device that draws nothing, on any machine.
+    fn gpu() -> Gpu {
+        let noop = NoopBackendOptions { enable: true, ..Default::default() };
+        let instance = Instance::new(InstanceDescriptor {
+            backends: Backends::NOOP,
+            backend_options: BackendOptions { noop, ..Default::default() },
+            ..InstanceDescriptor::new_without_display_handle()
+        });
+        Gpu::from_instance(&instance, None, None).expect("it is always there")
+    }
+
+    #[test]
+    fn a_panic_while_the_device_is_waited_for_is_its_failure() {
+        let gpu = gpu();
+        assert_eq!(gpu.poll(PollType::Poll), Ok(()));
+        // Where wgpu panics itself if the driver has lost the device.
+        gpu.queue.on_submitted_work_done(|| panic!("the driver\nhas lost the device"));
+        let lost = GraphicsError::Lost { reason: "the driver has lost the device".to_owned() };
+        assert_eq!(gpu.poll(PollType::wait_indefinitely()), Err(lost.clone()));
+        assert_eq!(gpu.failure(), Some(lost.clone()));
+        assert_eq!(gpu.poll(PollType::Poll), Err(lost), "the first failure is kept");
+    }
 }

@@ -64,8 +64,7 @@ pub fn read_texture(gpu: &Gpu, texture: &Texture) -> Result<Picture, GraphicsErr
     let mut encoder = device.create_command_encoder(&Default::default());
     readback.copy(&mut encoder, texture);
     queue.submit([encoder.finish()]);
-    let picture = readback.read(device);
-    let mut picture = picture.map_err(|error| gpu.failure().unwrap_or(error))?;
+    let mut picture = readback.read(gpu)?;
     if matches!(texture.format(), TextureFormat::Bgra8Unorm | TextureFormat::Bgra8UnormSrgb) {
         picture.pixels.chunks_exact_mut(PIXEL as usize).for_each(|pixel| pixel.swap(0, 2));
     }
@@ -109,8 +108,9 @@ impl Readback {
     }
 
     /// Waits for what was submitted, and reads it.
-    fn read(&self, device: &Device) -> Result<Picture, GraphicsError> {
-        let bytes = read_buffer(device, &self.buffer)?;
+    fn read(&self, gpu: &Gpu) -> Result<Picture, GraphicsError> {
+        let bytes =
+            read_buffer(gpu, &self.buffer).map_err(|error| gpu.failure().unwrap_or(error))?;
         let (stride, row) = (self.stride as usize, (self.width * PIXEL) as usize);
         let pixels = bytes.chunks(stride).flat_map(|padded| &padded[..row]).copied().collect();
         Ok(Picture { width: self.width, height: self.height, pixels })
@@ -118,14 +118,14 @@ impl Readback {
 }
 
 /// Waits for what was submitted, and reads a buffer.
-fn read_buffer(device: &Device, buffer: &Buffer) -> Result<Vec<u8>, GraphicsError> {
+fn read_buffer(gpu: &Gpu, buffer: &Buffer) -> Result<Vec<u8>, GraphicsError> {
     let lost = |reason: String| GraphicsError::Lost { reason };
     let (told, told_out) = std::sync::mpsc::channel();
     buffer.map_async(MapMode::Read, .., move |mapped| {
         // Nobody listens any more only if this function has failed.
         let _ = told.send(mapped);
     });
-    device.poll(PollType::wait_indefinitely()).map_err(|error| lost(error.to_string()))?;
+    gpu.poll(PollType::wait_indefinitely())?;
     match told_out.try_recv() {
         Ok(Ok(())) => {
             let bytes = match buffer.get_mapped_range(..) {

@@ -28,7 +28,7 @@ pub const OFFSCREEN_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 /// Draws the objects of a frame into whatever texture it is given.
 ///
 /// Objects are taken one by one, in any order; nothing is sent to the device before
-/// [`Painter::paint`] but what changed of volumes.
+/// [`Painter::paint`] but what changed of volumes, and the springs of a [`GpuMassSpring`].
 pub struct Painter {
     gpu: Gpu,
     /// From where the next frame is seen.
@@ -121,25 +121,23 @@ impl Painter {
         self.failure.clone().or_else(|| self.gpu.failure())
     }
 
-    /// The number of objects taken for this frame: those that are not culled.
-    #[must_use]
-    pub fn drawn(&self) -> usize {
-        self.surfaces.count() + self.volumes.count()
-    }
-
     /// Takes an object of this frame, unless neither it nor its shadow is in the picture. The springs of
     /// a [`GpuMassSpring`] are integrated in any case.
     pub fn add(&mut self, object: &Object) {
         let size = self.size();
+        if self.view.is_none() && self.failure.is_none() {
+            // Asked once a frame: the device's own note is behind a lock.
+            self.failure = self.gpu.failure();
+        }
+        if self.failure.is_some() {
+            return;
+        }
         let Self { gpu, layouts, surfaces, volumes, picker, integrator, units, .. } = self;
         let view = self.view.get_or_insert_with(|| {
             surfaces.clear(&gpu.queue);
             volumes.clear();
             View::new(self.camera, self.look, self.target.aspect())
         });
-        if self.failure.is_some() {
-            return;
-        }
         if let Some(springs) = GpuMassSpring::of(object)
             && gpu.failure().is_none()
         {
@@ -169,26 +167,23 @@ impl Painter {
     }
 
     /// Ends the frame: encodes how `picture`, a view of a texture of this size and format, is made of
-    /// what was taken. Does nothing once the device has failed.
+    /// what was taken. Once the device has failed there is nothing to encode, and units of GPU work end with that.
     pub fn paint(&mut self, encoder: &mut CommandEncoder, picture: &TextureView) {
+        if let Some(failure) = self.failure() {
+            return self.fail(failure);
+        }
         let view = self.view.take().unwrap_or_else(|| {
             self.surfaces.clear(&self.gpu.queue);
             self.volumes.clear();
             View::new(self.camera, self.look, self.target.aspect())
         });
-        if self.failure().is_some() {
-            return;
-        }
         let Gpu { device, queue, .. } = &self.gpu;
         let numbers = view.numbers();
         let words = numbers.as_words();
         match self.surfaces.upload((device, queue), encoder, &self.layouts, words) {
             Ok(false) => {}
             Ok(true) => self.globals.rebind(device, &self.layouts, self.surfaces.buffer()),
-            Err(error) => {
-                self.failure = Some(error);
-                return;
-            }
+            Err(error) => return self.fail(error),
         }
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("shadows"),
@@ -216,6 +211,16 @@ impl Painter {
         units.finish(&context);
         units.run_now(&context);
         units.encode(&context, encoder);
+    }
+
+    /// Nothing is drawn from now on: whoever waits for a unit of GPU work is told.
+    fn fail(&mut self, failure: GraphicsError) {
+        let view = self.view.take();
+        let view = view.unwrap_or_else(|| View::new(self.camera, self.look, self.target.aspect()));
+        let size = self.size();
+        let Self { gpu, surfaces, picker, integrator, units, .. } = self;
+        units.refuse(&Context { gpu, view: &view, size, surfaces, picker, integrator }, &failure);
+        self.failure = Some(failure);
     }
 }
 
@@ -276,11 +281,13 @@ impl Renderer for Offscreen {
         if self.painter.failure().is_some() {
             return;
         }
-        let Gpu { device, queue, .. } = self.painter.gpu();
-        let submitted = queue.submit([encoder.finish()]);
+        let submitted = self.painter.gpu().queue.submit([encoder.finish()]);
         if let Some(before) = self.submitted.replace(submitted) {
-            // A failure is noted by the device's own callbacks.
-            let _ = device.poll(PollType::Wait { submission_index: Some(before), timeout: None });
+            // A failure is noted, and ends the pictures with the next frame.
+            let _ = self
+                .painter
+                .gpu()
+                .poll(PollType::Wait { submission_index: Some(before), timeout: None });
         }
     }
 }

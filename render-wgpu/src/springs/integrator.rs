@@ -17,6 +17,8 @@ use wgpu::{
 use super::Task;
 use crate::gpu::Gpu;
 
+/// Invocations that integrate a body together; as `springs.wgsl` has it.
+const WORKGROUP: u32 = 256;
 /// Numbers of a node that are sent: position, velocity, mass.
 const SENT: usize = 7;
 /// Numbers of a node that come back: position, velocity.
@@ -123,14 +125,19 @@ impl Integrator {
     }
 }
 
-/// Whether a body can be integrated by a device: there are nodes, compute shaders, and buffers that
-/// hold it.
+/// Whether a body can be integrated by a device: there are nodes, compute shaders of so many invocations, and
+/// buffers that hold it.
 fn fits(gpu: &Gpu, topology: &Topology) -> bool {
     let limits = gpu.device.limits();
     let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
     let largest = bytes(table_len(topology)).max(bytes((SENT + RETURNED) * topology.nodes()));
     let flags = gpu.adapter().get_downlevel_capabilities().flags;
-    topology.nodes() > 0 && flags.contains(DownlevelFlags::COMPUTE_SHADERS) && largest <= most
+    let invocations =
+        limits.max_compute_workgroup_size_x.min(limits.max_compute_invocations_per_workgroup);
+    topology.nodes() > 0
+        && flags.contains(DownlevelFlags::COMPUTE_SHADERS)
+        && invocations >= WORKGROUP
+        && largest <= most
 }
 
 /// The size of so many numbers, in bytes.

@@ -221,11 +221,6 @@ impl Surfaces {
         });
     }
 
-    /// The number of bodies in this frame.
-    pub(crate) fn count(&self) -> usize {
-        self.makes.iter().map(|make| make.surfaces.len() + make.wires.len()).sum()
-    }
-
     /// Bodies that are drawn by one call.
     fn each<'a>(&'a self, mut draw: impl FnMut(Batch<'a>)) {
         let mut first = self.instances;

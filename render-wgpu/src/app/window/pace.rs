@@ -45,8 +45,8 @@ impl Pace {
     /// Whether the frame that begins now is to be shown.
     pub(super) fn shows(&mut self, gpu: &Gpu) -> bool {
         if let Some(begun) = self.begun {
-            // A failure is noted by the device's own callbacks.
-            let _ = gpu.device.poll(PollType::Poll);
+            // A failure is noted, and ends the pictures.
+            let _ = gpu.poll(PollType::Poll);
             let Some(drawn) = self.drawn.lock().unwrap_or_else(PoisonError::into_inner).take()
             else {
                 return false;
