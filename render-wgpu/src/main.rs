@@ -1,4 +1,5 @@
-//! The `dualframe` program: runs the particle environment and says how fast, and whether soundly.
+//! The `dualframe` program: runs particles and operations, replays them, does the experiments, and says how fast, and
+//! whether soundly.
 #![forbid(unsafe_code)]
 
 mod app;

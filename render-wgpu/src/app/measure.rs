@@ -24,6 +24,8 @@ pub(super) struct Measure<'a> {
     pub(super) candidates: Vec<u32>,
     pub(super) collisions: Vec<u32>,
     count: AllocationCounter<'a>,
+    /// Allocations that do not count.
+    beside: usize,
     at_warm_up: usize,
     at_last: usize,
 }
@@ -42,6 +44,7 @@ impl<'a> Measure<'a> {
             candidates: Vec::with_capacity(room),
             collisions: Vec::with_capacity(room),
             count,
+            beside: 0,
             at_warm_up: 0,
             at_last: 0,
         }
@@ -62,7 +65,7 @@ impl<'a> Measure<'a> {
             self.collisions.push(u32::try_from(record.pairs.collisions).unwrap_or(u32::MAX));
         }
         self.last = record.swapped;
-        self.at_last = (self.count)();
+        self.at_last = (self.count)() - self.beside;
         if self.frames == self.warm_up {
             self.at_warm_up = self.at_last;
         }
@@ -72,12 +75,12 @@ impl<'a> Measure<'a> {
     pub(super) fn beside(&mut self, work: impl FnOnce()) {
         let before = (self.count)();
         work();
-        self.at_warm_up += (self.count)() - before;
+        self.beside += (self.count)() - before;
     }
 
     /// Heap allocations from the warm-up's end to the last frame.
     pub(super) fn allocations(&self) -> usize {
-        self.at_last.saturating_sub(self.at_warm_up)
+        self.at_last - self.at_warm_up
     }
 
     /// Seconds from the start to the last swap.

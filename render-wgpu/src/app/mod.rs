@@ -69,7 +69,7 @@ fn run_replay(args: &ReplayArgs) -> ExitCode {
     let line = |error| format!("{}: {}", args.file.display(), with_causes(error));
     let report = match replay::run(args, json.as_ref()) {
         Ok(report) => report,
-        Err(error) => return fail(&line(&error), BAD_ARGUMENT),
+        Err(error) => return fail(&line(&error), error.status()),
     };
     report.print();
     let told = Told::default();

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::args::Products;
 use super::error::RunError;
-use super::pictures::file_of_frame;
+use super::pictures::{file_of_frame, is_file_of_frame};
 
 /// The files that a run is to write; what is in them is not touched yet.
 pub(super) struct Outputs {
@@ -46,7 +46,11 @@ impl Outputs {
         };
         let Self { json, picture, trace, record, save } = &outputs;
         let written = [json, picture, trace, record, save].into_iter().flatten();
-        check_distinct(written.map(Output::path).chain(input))?;
+        let files: Vec<&Path> = written.map(Output::path).chain(input).collect();
+        check_distinct(files.iter().copied())?;
+        if let Some(folder) = &args.frames_out {
+            check_no_frame(folder, &files)?;
+        }
         Ok(outputs)
     }
 }
@@ -108,6 +112,19 @@ pub(super) fn check_distinct<'a>(paths: impl Iterator<Item = &'a Path>) -> Resul
         known.push((path, identity));
     }
     Ok(())
+}
+
+/// Sees that none of some files is one that a frame's picture goes to.
+fn check_no_frame(folder: &Path, paths: &[&Path]) -> Result<(), String> {
+    let folder = fs::canonicalize(folder).ok();
+    let is_frame = |path: &&Path| {
+        let found = fs::canonicalize(path).ok();
+        found.is_some_and(|found| found.parent() == folder.as_deref() && is_file_of_frame(&found))
+    };
+    match paths.iter().copied().find(is_frame) {
+        Some(path) => Err(format!("{} is where a frame's picture goes", path.display())),
+        None => Ok(()),
+    }
 }
 
 /// What a file is told from others by: its device and number.

@@ -1,5 +1,6 @@
 //! Pictures without a window: of the last frame, or of every one.
 
+use std::ffi::OsStr;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -126,6 +127,13 @@ pub(super) fn write(picture: Result<Picture, GraphicsError>, file: &File) -> Res
 /// The file in `folder` that gets a frame's picture.
 pub(super) fn file_of_frame(folder: &Path, frame: u64) -> PathBuf {
     folder.join(format!("frame-{frame:06}.png"))
+}
+
+/// Whether a file is called as one that gets a frame's picture.
+pub(super) fn is_file_of_frame(file: &Path) -> bool {
+    let name = file.file_name().and_then(OsStr::to_str);
+    let number = name.and_then(|name| name.strip_prefix("frame-")?.strip_suffix(".png"));
+    number.is_some_and(|number| number.parse::<u64>().is_ok())
 }
 
 /// Pictures on their way to files, written by a thread of their own.

@@ -17,6 +17,7 @@ use super::args::ReplayArgs;
 use super::error::RunError;
 use super::outputs::{self, Output};
 use super::scenes::{AnyScene, AnySceneError};
+use super::{BAD_ARGUMENT, UNSOUND};
 
 /// Why nothing of a recording can be played, or not all.
 #[derive(Debug, Error)]
@@ -34,6 +35,17 @@ pub(super) enum ReplayFault {
     /// What is to be written is what it is played from.
     #[error("{0}")]
     Output(String),
+}
+
+impl ReplayFault {
+    /// The status that the program ends with if nothing is played.
+    pub(super) fn status(&self) -> u8 {
+        match self {
+            // As for any other run: no thread was to be had, say.
+            Self::Executor(_) => UNSOUND,
+            _ => BAD_ARGUMENT,
+        }
+    }
 }
 
 /// What came of a replay.

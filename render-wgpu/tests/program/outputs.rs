@@ -150,6 +150,10 @@ fn a_file_is_not_two() {
     // One that is not there yet.
     told(&run(&["--json", &other, "--trace", &other]), 2, "are the same file");
     assert!(!Path::new(&other).exists());
+    // One of the pictures of all frames.
+    let [pictures, frame] = ["pictures", "pictures/frame-000007.png"].map(|name| folder.file(name));
+    let both = ["--frames-out", &pictures, "--picture", &frame];
+    told(&run(&both), 2, "is where a frame's picture goes");
     // An image, of a recording too.
     let image_of = synthetic_ct().expect("it has no file");
     save(image.as_ref(), image_of.grid(), image_of.voxels()).expect("it can be written");

@@ -5,7 +5,7 @@ use dualframe_render_wgpu::renderer::Painter;
 use dualframe_sim::mailbox::Mailbox;
 use dualframe_sim::object::Object;
 use egui::{Color32, Painter as Painter2d, Stroke, Ui, vec2};
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4Swizzles};
 
 use super::controls::Controls;
 
@@ -57,9 +57,11 @@ impl<'a> Marks<'a> {
         let projection = self.camera.view_projection(area.aspect_ratio());
         let mut before = None;
         for (place, normal) in places {
-            let is_seen = normal.dot(self.camera.eye() - place) > 0.0;
+            // What is behind the eye would be mirrored.
+            let projected = projection * place.extend(1.0);
+            let is_seen = normal.dot(self.camera.eye() - place) > 0.0 && projected.w > 0.0;
             let seen = is_seen.then(|| {
-                let share = 0.5 * projection.project_point3(place) + 0.5;
+                let share = 0.5 * projected.xy() / projected.w + 0.5;
                 area.lerp_inside(vec2(share.x, 1.0 - share.y))
             });
             if let (Some(from), Some(to)) = (before, seen) {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui_winit::State;
 use glam::Vec2;
 use winit::application::ApplicationHandler;
-use winit::dpi::LogicalSize;
+use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent};
 use winit::event_loop::ActiveEventLoop;
 use winit::keyboard::{Key, NamedKey};
@@ -103,7 +103,7 @@ impl ApplicationHandler for Input {
         let (width, height) = self.size;
         let attributes = Window::default_attributes()
             .with_title("dualframe")
-            .with_inner_size(LogicalSize::new(width, height));
+            .with_inner_size(PhysicalSize::new(width, height));
         match event_loop.create_window(attributes) {
             Ok(window) => self.window = Some(Arc::new(window)),
             Err(error) => self.failure = Some(error.to_string()),

@@ -326,12 +326,14 @@ impl<H: Hand> Renderer for View<H> {
     }
 
     fn swap(&mut self, _frame: u64) {
-        if self.is_shown && !self.is_closing() {
+        if self.is_shown {
             self.redraw();
         }
         self.attend(Duration::ZERO);
         self.pace.keep(self.controls.is_real_time);
-        self.is_shown = self.pace.shows(self.painter.gpu()) && self.screen.is_visible();
+        // What is taken is drawn: else it would be there still when a last picture is taken.
+        self.is_shown =
+            !self.is_closing() && self.pace.shows(self.painter.gpu()) && self.screen.is_visible();
     }
 
     fn is_bound(&self) -> bool {
