@@ -5,6 +5,7 @@
 use std::fs;
 
 use dualframe_sim::executor::ExecutorKind;
+use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::plan::{Plan, Retraction, Sweep};
 use dualframe_sim::experiment::race::Runner;
 use dualframe_sim::experiment::subject::Subject;
@@ -82,6 +83,25 @@ fn a_folder_that_is_not_there() {
     let out = std::path::Path::new("/no/such/folder");
     let error = run(&[Experiment::PerFrame], &tiny(), out, &mut |_, _| ()).err();
     assert!(error.is_some_and(|error| error.to_string().contains("/no/such/folder")));
+}
+
+#[test]
+fn a_plan_that_lacks_something() {
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let plan = tiny();
+    let sweep =
+        |sweep: &Sweep, objects: &[usize]| Sweep { objects: objects.to_vec(), ..sweep.clone() };
+    let wrong = [
+        Plan { per_frame: sweep(&plan.per_frame, &[]), ..tiny() },
+        Plan { per_frame: sweep(&plan.per_frame, &[5, 6]), ..tiny() },
+        Plan { per_frame: Sweep { rounds: 0, ..plan.per_frame.clone() }, ..tiny() },
+        Plan { compare: sweep(&plan.compare, &[3]), ..tiny() },
+    ];
+    for plan in wrong {
+        let experiments = [Experiment::PerFrame, Experiment::Compare];
+        let error = run(&experiments, &plan, out.path(), &mut |_, _| ()).err();
+        assert!(matches!(error, Some(ExperimentError::Plan { .. })), "{plan:?}: {error:?}");
+    }
 }
 
 /// Where the right hand is.

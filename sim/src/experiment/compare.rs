@@ -2,7 +2,7 @@
 
 use super::error::ExperimentError;
 use super::figure::{Chart, Figure, Line};
-use super::load::{RenderLoad, StandIn};
+use super::load::{RENDER_SHARE, RenderLoad, StandIn};
 use super::outcome::{Outcome, marked};
 use super::plan::Plan;
 use super::race::{Race, Runner, WARM_UP};
@@ -117,8 +117,10 @@ impl Study<'_> {
             Subject::Retraction(_) => "automated retraction".to_owned(),
         };
         let rendering = match outcome.race.load {
-            RenderLoad::Null => "",
-            RenderLoad::StandIn(_) => ", rendering 15 % of the work",
+            RenderLoad::Null => String::new(),
+            RenderLoad::StandIn(_) => {
+                format!(", rendering {:.0} % of the work", 100.0 * RENDER_SHARE)
+            }
         };
         Chart {
             name,

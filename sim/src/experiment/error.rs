@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::Experiment;
 use crate::executor::ExecutorError;
 use crate::scene::SceneError;
 use crate::scene::craniotomy::BuildError;
@@ -42,6 +43,14 @@ pub enum ExperimentError {
         run: String,
         /// The number of objects.
         objects: usize,
+    },
+    /// The plan has other sizes than an experiment takes.
+    #[error("{experiment:?} cannot be planned so: it takes {takes}")]
+    Plan {
+        /// The experiment.
+        experiment: Experiment,
+        /// What it takes.
+        takes: &'static str,
     },
     /// A file cannot be written.
     #[error("cannot write {}", path.display())]

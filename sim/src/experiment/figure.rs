@@ -112,5 +112,24 @@ fn plot(line: Line) -> Plot {
     if !line.label.is_empty() {
         plot = plot.with_legend(line.label);
     }
-    if line.dashed { plot.with_dashed().into() } else { plot.into() }
+    match (line.dashed, line.color < COLORS.len()) {
+        (true, _) => plot.with_dashed().into(),
+        // The second one of this colour.
+        (false, false) => plot.with_dotted().into(),
+        (false, true) => plot.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_lines_than_colors_are_told_apart() {
+        let line = |color| Line { points: vec![(0.0, 0.0), (1.0, 1.0)], color, ..Line::default() };
+        let figure = |color| Chart::default().lines(vec![line(color)]).expect("a line is drawn");
+        for color in 0..COLORS.len() {
+            assert_ne!(figure(color).svg, figure(color + COLORS.len()).svg, "color {color}");
+        }
+    }
 }

@@ -41,7 +41,7 @@ use self::error::ExperimentError;
 use self::figure::Figure;
 use self::machine::Machine;
 use self::outcome::Outcome;
-use self::plan::Plan;
+use self::plan::{Plan, Sweep};
 use self::race::{OnFrame, Race, Runner, WARM_UP};
 use self::table::Table;
 
@@ -97,6 +97,19 @@ impl Experiment {
         }
     }
 
+    /// Whether a plan has what it takes.
+    fn check(self, plan: &Plan) -> Result<(), ExperimentError> {
+        let (is_right, takes) = match self {
+            Self::PerFrame => {
+                let Sweep { objects, rounds, .. } = &plan.per_frame;
+                (objects.len() == 1 && *rounds > 0, "one number of objects, and a round")
+            }
+            Self::Compare => (plan.compare.objects.len() == 2, "two numbers of objects"),
+            _ => (true, ""),
+        };
+        if is_right { Ok(()) } else { Err(ExperimentError::Plan { experiment: self, takes }) }
+    }
+
     fn run(self, laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentError> {
         match self {
             Self::Scalability => scalability::run(laboratory),
@@ -132,6 +145,7 @@ pub fn run(
     out: &Path,
     progress: &mut dyn FnMut(Experiment, u64),
 ) -> Result<Vec<Report>, ExperimentError> {
+    experiments.iter().try_for_each(|experiment| experiment.check(plan))?;
     let machine = Machine::this();
     let calibrator = Calibrator::default();
     let mut reports = Vec::new();

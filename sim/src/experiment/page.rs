@@ -1,6 +1,7 @@
 //! One self-contained HTML page of everything that was found.
 
 use super::Report;
+use super::calibrator::Phase;
 use super::machine::Machine;
 use super::plan::Plan;
 use super::table::Table;
@@ -15,13 +16,14 @@ pub(super) fn page(machine: &Machine, plan: &Plan, reports: &[Report]) -> String
     let body: String = reports.iter().map(section).collect();
     let machine = escaped(&machine.to_string());
     let seed = plan.seed;
+    let (gain, ping_pong) = (Phase::LEAST_GAIN, Phase::WORST_PING_PONG);
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <title>dualframe: experiments</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
          <h1>dualframe: experiments</h1>\n\
          <p>{machine}; seed {seed}. Medians of interleaved rounds. A round is marked when two \
-         independent threads gain less than 1.9 over one, or a ping-pong between them takes more \
-         than three times what is usual; marked rounds are in the CSV files. The paper's values are those \
+         independent threads gain less than {gain} over one, or a ping-pong between them takes more \
+         than {ping_pong} times what is usual; marked rounds are in the CSV files. The paper's values are those \
          of a 6-core Intel i7-980X.</p>\n{body}</body>\n</html>\n"
     )
 }
