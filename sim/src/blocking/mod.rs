@@ -195,9 +195,10 @@ impl Blocking {
 
     /// Puts the objects of the block number `index` into it.
     pub fn fill(&mut self, index: usize, block: &mut Block) {
-        let Self { objects, members, order, room, .. } = self;
+        let Self { objects, members, order, room, moving_blocks, .. } = self;
         let Some(Members { ids, .. }) = members.get(index) else { return };
-        block.reserve(ids.len().max(*room));
+        let room = if index < *moving_blocks { *room } else { 0 };
+        block.reserve(ids.len().max(room));
         order.clear();
         let there = |&id: &u32| objects.get(id as usize)?.as_ref().map(Order::of);
         order.extend(ids.iter().filter_map(there));

@@ -19,7 +19,8 @@ pub struct StageSeconds {
     pub update: f64,
     /// In drawing and swapping.
     pub render: f64,
-    /// In none of them while frames were being computed: synchronising, waiting, regrouping.
+    /// In none of them while frames were being computed: synchronising, waiting, regrouping. The pipeline's workers
+    /// count what they wait for each other, not what they wait for blocks to be formed anew.
     pub idle: f64,
 }
 

@@ -164,7 +164,8 @@ pub trait Executor: Send {
     /// [is bound](Renderer::is_bound) to that.
     ///
     /// # Errors
-    /// More than 30,000 objects crowd so fast that the pipeline's table of blocks that meet, which grows every
+    /// More than 512 blocks, of which more than 63 threads are the usual cause, crowd so fast that the pipeline's
+    /// table of blocks that meet, which grows every
     /// [`FRAMES_PER_BLOCKING`](crate::blocking::FRAMES_PER_BLOCKING) frames, is full. The environment cannot go
     /// on then: a frame without some of its interactions would not be the same for every schedule. Or the
     /// pipeline's pool was enlarged and the threads cannot be had; frames before that are done, and it can go on.

@@ -60,9 +60,9 @@ impl Penalty {
     fn impulse(&self, bodies: [&Object; 2], touch: &Touch, time_step: f32) -> Vec3 {
         let normal = Vec3::from_array(touch.normal);
         if touch.nodes == [Contact::BODY; 2] {
-            return normal * (self.body_stiffness * touch.depth * time_step);
+            return normal * ((self.body_stiffness * touch.depth).max(0.0) * time_step);
         }
-        let mut force = self.stiffness * touch.depth;
+        let mut force = (self.stiffness * touch.depth).max(0.0);
         if self.damping == 0.0 && self.friction == 0.0 {
             return normal * (force * time_step);
         }
@@ -117,5 +117,32 @@ fn mass(object: &Object, node: u32) -> f32 {
     match mesh.masses().get(node as usize) {
         Some(&mass) if node != Contact::BODY && mass > 0.0 => mass,
         _ => f32::INFINITY,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use parry3d::math::Pose;
+    use parry3d::shape::SharedShape;
+
+    use super::*;
+    use crate::behavior::Fixed;
+    use crate::geometry::Rigid;
+    use crate::object::{Group, ObjectId};
+
+    #[test]
+    fn what_is_only_near_is_not_pulled() {
+        let bodies = [0, 1].map(|id| {
+            let ball = Rigid::new(SharedShape::ball(0.1), Pose::IDENTITY);
+            Object::new(ObjectId(id), Group(0), Geometry::Rigid(ball), Fixed)
+        });
+        let [first, second] = &bodies;
+        for damping in [0.0, 1.0] {
+            let penalty = Penalty::new(100.0, damping, 0.0).expect("positive values");
+            for nodes in [[Contact::BODY; 2], [0, Contact::BODY]] {
+                let near = Touch { nodes, normal: [1.0, 0.0, 0.0], depth: -1e-3 };
+                assert_eq!(penalty.impulse([first, second], &near, 1.0), Vec3::ZERO);
+            }
+        }
     }
 }

@@ -50,7 +50,7 @@ impl Detection for PieceInBone {
 fn way_to(bone: &Volume, place: Vec3, way: Vec3) -> Option<(f32, Vec3)> {
     let step = bone.spacing().min_element();
     // As an integer, what is not a number becomes 0.
-    let steps = (way.length() / step).ceil() as u32;
+    let steps = ((way.length() / step).ceil() as u32).min(MOST_STEPS);
     let inside = |share: f32| bone.density_at(place + way * share) >= 0.5;
     let share = |number: u32| number as f32 / steps.max(1) as f32;
     let first = (0..=steps).map(share).find(|&share| inside(share))?;
@@ -63,6 +63,10 @@ fn way_to(bone: &Volume, place: Vec3, way: Vec3) -> Option<(f32, Vec3)> {
     let (depth, normal) = in_bone(bone, point)?;
     Some(((place - point).dot(normal) - depth, normal))
 }
+
+/// Steps of a way, each of a voxel at most unless the way is longer; usually 1,024: at 240 frames a second and voxels of
+/// 0.5 mm a piece of 120 m/s. What is faster may pass through thin bone, and takes no longer for it.
+const MOST_STEPS: u32 = 1_024;
 
 /// Halvings of the last step, for the surface; usually 5: to a sixtieth of a voxel.
 const HALVINGS: usize = 5;
@@ -196,5 +200,23 @@ impl Point {
         let rubbed = (self.rubbed - slip * self.mass).clamp_length_max(friction * self.pressed);
         motion.push(rubbed - self.rubbed, self.place);
         self.rubbed = rubbed;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use parry3d::math::Pose;
+
+    use super::*;
+
+    /// Voxel by voxel it would take minutes.
+    #[test]
+    fn a_way_without_end_is_followed_in_no_time() {
+        let spacing = 5e-4;
+        let bone = Volume::new([8; 3], Vec3::splat(spacing), Pose::IDENTITY, &[0; 512]);
+        let bone = bone.expect("it is small");
+        for length in [1e9, f32::MAX, f32::INFINITY, f32::NAN] {
+            assert_eq!(way_to(&bone, Vec3::ZERO, Vec3::X * length), None, "{length}");
+        }
     }
 }

@@ -1,4 +1,5 @@
-//! Each operation of every set of instructions, on numbers that are special.
+//! Operations of every set of instructions on numbers that are special. Those of arithmetic, which IEEE 754 leaves no
+//! choice, are compared by whole bodies, in `tests/simd.rs`.
 
 use super::*;
 

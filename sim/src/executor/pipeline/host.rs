@@ -233,12 +233,13 @@ impl<'s> Environment for Host<'s> {
         letters.clear();
         letters.extend(std::iter::from_fn(|| inputs.next_letter()));
         let number = shared.number(frame);
-        if shared.overflow.deliver(id, number, |letter| letters.push(letter)) {
-            letters.sort_unstable_by_key(|&(from, _)| from);
-        }
+        shared.overflow.deliver(id, number, |letter| letters.push(letter));
+        // Each object's are found at once, however many the block has.
+        letters.sort_unstable_by_key(|(from, parcel)| (parcel.to, *from));
         let from_outside = shared.outside.due(number);
         let mail = |object| {
-            let own = letters.iter().filter(move |(_, parcel)| parcel.to == object);
+            let first = letters.partition_point(|(_, parcel)| parcel.to < object);
+            let own = letters[first..].iter().take_while(move |(_, parcel)| parcel.to == object);
             own.map(|(_, parcel)| &parcel.message).chain(from_outside.to(object))
         };
         let workspace = &mut *self.own.workspace.borrow_mut();

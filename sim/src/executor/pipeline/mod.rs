@@ -44,6 +44,9 @@ use crate::scene::Scene;
 use crate::stages::{PairCount, Stages};
 use crate::timeline::Timeline;
 
+/// Frames that a pipeline is built for at most; 2³¹: the core's frame numbers come round after twice as many.
+const MOST_FRAMES: u64 = 1 << 31;
+
 /// Advances an environment by the pipeline. The calling thread is worker number 0; who updates objects renders them,
 /// unless the renderer [is bound](Renderer::is_bound) to the calling thread, or blocks are single objects
 /// ([`Grain::Pairwise`]): then the calling thread does.
@@ -82,6 +85,8 @@ impl PipelineExecutor {
     ) -> Result<Self, ExecutorError> {
         let Scene { objects, stages, frame, mail: under_way, mailbox } = scene;
         let (mut blocking, mut blocks) = Blocking::new(objects, grain, pool.threads())?;
+        let mut team = Team::default();
+        team.grow(pool.threads())?;
         // As many as there are threads now; whoever joins later shares one.
         let homes = pool.threads().min(MOST_HOMES);
         if grain == Grain::Spatial {
@@ -110,7 +115,7 @@ impl PipelineExecutor {
             config: Config { broad_phase, entry, tokens: 1, homes: homes as u32 },
             grain,
             pool,
-            team: Team::default(),
+            team,
             frame,
             rendering: Cost::default(),
             mail,
@@ -210,7 +215,7 @@ impl Executor for PipelineExecutor {
             }
             let workers = self.pool.threads();
             self.team.grow(workers)?;
-            let frames = end - self.frame;
+            let frames = (end - self.frame).min(MOST_FRAMES);
             if let End::Outgrown(table, to) = self.run(workers, frames, renderer, on_frame)? {
                 self.tables.grow(table, to, self.blocks.len());
             }

@@ -44,20 +44,19 @@ impl Overflow {
         late.most = late.most.max(waiting);
     }
 
-    /// Hands over the letters to a unit for its update in a frame; says whether there were any.
-    pub(super) fn deliver(&self, to: UnitId, frame: u64, take: impl FnMut((From, Parcel))) -> bool {
+    /// Hands over the letters to a unit for its update in a frame.
+    pub(super) fn deliver(&self, to: UnitId, frame: u64, take: impl FnMut((From, Parcel))) {
         if self.waiting.load(Ordering::Relaxed) == 0 {
-            return false;
+            return;
         }
         let mut late = self.lock();
-        let Some(letters) = late.letters.get_mut(&to) else { return false };
+        let Some(letters) = late.letters.get_mut(&to) else { return };
         let before = letters.len();
         let due = letters.extract_if(.., |letter| letter.due <= frame);
         due.map(|letter| (letter.from, letter.parcel)).for_each(take);
         let delivered = before - letters.len();
         let waiting = self.waiting.load(Ordering::Relaxed) - delivered;
         self.waiting.store(waiting, Ordering::Relaxed);
-        delivered > 0
     }
 
     /// Hands over all letters.
