@@ -188,6 +188,9 @@ fn drawn(
     let began = Instant::now();
     manager.run(frames, &mut offscreen, &mut |_| ())?;
     let seconds = began.elapsed().as_secs_f64();
+    if !manager.quarantined().is_empty() {
+        return Err(format!("objects were quarantined in {}", runner.label()).into());
+    }
     let end = End { state: manager.state_hash(), picture: offscreen.picture()? };
     match expected.take() {
         Some(other) if other != end => {
