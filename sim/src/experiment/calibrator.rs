@@ -20,7 +20,7 @@ const REPETITIONS: usize = 5;
 const TRIPS: u32 = 50;
 /// Values of the ping-pong, if time allows.
 const BATCHES: usize = 20;
-/// The longest that the ping-pong may take: on a single core each trip is a switch of threads.
+/// After so long no further batch of the ping-pong begins: on a single core each trip is a switch of threads.
 const PATIENCE: Duration = Duration::from_millis(20);
 /// Tells the partner of a ping-pong to stop.
 const STOP: u32 = u32::MAX;
@@ -76,7 +76,7 @@ impl Default for Calibrator {
 }
 
 impl Calibrator {
-    /// Measures the present phase, in about 30 ms.
+    /// Measures the present phase, in about 30 ms; on a single core in some tenths of a second.
     #[must_use]
     pub fn phase(&self) -> Phase {
         Phase { gain: self.gain(), ping_pong: ping_pong() * 1e9 }

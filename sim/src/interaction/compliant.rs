@@ -1,23 +1,13 @@
 //! Response by implicit springs: what holds and pushes light nodes over long frames.
 
 use glam::Vec3;
-use thiserror::Error;
 
 use super::contact::Contact;
+use super::error::{ResponseError, check};
 use super::touches::{Touch, Touches};
 use super::{Impulses, Response};
 use crate::geometry::{Geometry, Mesh};
 use crate::object::Object;
-
-/// Why a response cannot be built.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
-#[error("{what} is {value}; it must be finite and not negative")]
-pub struct CompliantError {
-    /// The name of the value.
-    pub what: &'static str,
-    /// The value.
-    pub value: f32,
-}
 
 /// A spring and a dashpot along each touch's normal, one implicit step of a frame's length: with masses
 /// m, M of the two nodes, w = 1/m + 1/M, and the rate v at which they part, the impulse is
@@ -40,7 +30,7 @@ impl Compliant {
     ///
     /// # Errors
     /// A value that is negative or not finite.
-    pub fn contact(stiffness: f32, damping: f32) -> Result<Self, CompliantError> {
+    pub fn contact(stiffness: f32, damping: f32) -> Result<Self, ResponseError> {
         check("the stiffness", stiffness)?;
         check("the damping", damping)?;
         Ok(Self { stiffness, damping, pulls: false })
@@ -50,13 +40,9 @@ impl Compliant {
     ///
     /// # Errors
     /// A value that is negative or not finite.
-    pub fn link(stiffness: f32, damping: f32) -> Result<Self, CompliantError> {
+    pub fn link(stiffness: f32, damping: f32) -> Result<Self, ResponseError> {
         Ok(Self { pulls: true, ..Self::contact(stiffness, damping)? })
     }
-}
-
-fn check(what: &'static str, value: f32) -> Result<(), CompliantError> {
-    if value >= 0.0 && value.is_finite() { Ok(()) } else { Err(CompliantError { what, value }) }
 }
 
 impl Response for Compliant {

@@ -1,24 +1,14 @@
 //! Response by penalty forces.
 
 use glam::Vec3;
-use thiserror::Error;
 
 use super::Response;
 use super::contact::Contact;
+use super::error::{ResponseError, check};
 use super::impulses::Impulses;
 use super::touches::{Touch, Touches};
 use crate::geometry::Geometry;
 use crate::object::Object;
-
-/// Why a response cannot be built.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
-#[error("{what} is {value}; it must be finite and not negative")]
-pub struct PenaltyError {
-    /// The name of the value.
-    pub what: &'static str,
-    /// The value.
-    pub value: f32,
-}
 
 /// Pushes touching objects apart along the contact's normal, by a spring and a dashpot, and never
 /// pulls; where there is friction, it is Coulomb's, limited so that it stops a node at most.
@@ -39,7 +29,7 @@ impl Penalty {
     ///
     /// # Errors
     /// A value that is negative or not finite.
-    pub fn new(stiffness: f32, damping: f32, friction: f32) -> Result<Self, PenaltyError> {
+    pub fn new(stiffness: f32, damping: f32, friction: f32) -> Result<Self, ResponseError> {
         check("the stiffness", stiffness)?;
         check("the damping", damping)?;
         check("the friction", friction)?;
@@ -50,7 +40,7 @@ impl Penalty {
     ///
     /// # Errors
     /// A value that is negative or not finite.
-    pub fn with_body_stiffness(mut self, stiffness: f32) -> Result<Self, PenaltyError> {
+    pub fn with_body_stiffness(mut self, stiffness: f32) -> Result<Self, ResponseError> {
         check("the stiffness of bodies", stiffness)?;
         self.body_stiffness = stiffness;
         Ok(self)
@@ -80,10 +70,6 @@ impl Penalty {
         let drag = (self.friction * force * time_step).min(stopping);
         push - slip * (drag / speed)
     }
-}
-
-fn check(what: &'static str, value: f32) -> Result<(), PenaltyError> {
-    if value >= 0.0 && value.is_finite() { Ok(()) } else { Err(PenaltyError { what, value }) }
 }
 
 impl Response for Penalty {

@@ -14,7 +14,7 @@ use crate::geometry::{
     icosphere,
 };
 use crate::interaction::{
-    InteractionPair, NodeSpheres, NodesInShape, Penalty, PenaltyError, RuleError, Rules,
+    InteractionPair, NodeSpheres, NodesInShape, Penalty, ResponseError, RuleError, Rules,
 };
 use crate::object::{Drawing, Group, Object, ObjectId, VisualProperties};
 use crate::simd::Simd;
@@ -91,7 +91,7 @@ pub enum SceneError {
     Mesh(#[from] MeshError),
     /// A response was refused.
     #[error(transparent)]
-    Penalty(#[from] PenaltyError),
+    Penalty(#[from] ResponseError),
     /// A rule was refused.
     #[error(transparent)]
     Rule(#[from] RuleError),

@@ -11,8 +11,8 @@ use crate::behavior::{Behavior, Bone, Instrument, Tool, Workpieces};
 use crate::device::DeviceSample;
 use crate::geometry::Geometry;
 use crate::interaction::{
-    Attached, BurrForce, BurrInBone, Compliant, CompliantError, Detection, InteractionPair, Link,
-    NodesInBone, NodesInShape, PieceInBone, PieceOnBone, Response, RuleError, Rules,
+    Attached, BurrForce, BurrInBone, Compliant, Detection, InteractionPair, Link, NodesInBone,
+    NodesInShape, PieceInBone, PieceOnBone, Response, ResponseError, RuleError, Rules,
 };
 use crate::message::Message;
 use crate::object::{Group, Object, ObjectId, VisualProperties};
@@ -72,7 +72,7 @@ pub enum BuildError {
     Rule(#[from] RuleError),
     /// A response was refused.
     #[error(transparent)]
-    Response(#[from] CompliantError),
+    Response(#[from] ResponseError),
 }
 
 /// The environment before an operation on a head: 30 objects.
