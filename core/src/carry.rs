@@ -89,13 +89,14 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         }
     }
 
-    /// Gives what is carried to those who found nothing to do, if there are any.
+    /// Gives what is carried to those who found nothing to do, if there are any, and calls for what was queued
+    /// since the last call, a rendering that was put back say: what is done next may take long.
     #[inline]
     pub(crate) fn share(&mut self) {
         if !self.is_empty() && self.pipeline.bells.somebody_is_hungry() {
             self.shed();
-            self.announce();
         }
+        self.announce();
     }
 
     /// Carries `work`, if there is room for it.
@@ -177,7 +178,14 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         }
         match (self.has_rendering() || self.pipeline.render_visible(), self.renders_shared) {
             (true, false) => _ = self.takes_renderer(),
-            (false, true) => self.put_renderer_back(),
+            (false, true) => {
+                self.put_renderer_back();
+                // Whoever found it taken meanwhile may sleep before this worker's next step.
+                fence(site::FENCE_PUT_BACK);
+                if !seeded!(NotLookedAgain) && self.pipeline.render_visible() {
+                    self.takes_renderer();
+                }
+            }
             _ => {}
         }
     }
@@ -299,12 +307,16 @@ mod tests {
     use crate::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
     use crate::wait::{Bell, Epoch};
     use crate::worker::Step;
+    use std::sync::atomic::{AtomicU32, Ordering};
     use std::sync::{Mutex, MutexGuard, PoisonError};
 
-    /// Nothing happens in it.
-    struct Void;
+    /// Nothing happens in it. Notes how many calls there had been when a unit entered.
+    struct Void<'c> {
+        calls: &'c Calls,
+        before_entry: AtomicU32,
+    }
 
-    impl Environment for Void {
+    impl Environment for Void<'_> {
         type Object = ();
         type Interaction = ();
         type Contact = ();
@@ -313,6 +325,11 @@ mod tests {
         type Error = TableFull;
 
         fn broad_phase(&self, (): &(), (): &()) -> bool {
+            false
+        }
+
+        fn interacts_within(&self, (): &()) -> bool {
+            self.before_entry.store(*self.calls.count(), Ordering::Relaxed);
             false
         }
 
@@ -364,8 +381,9 @@ mod tests {
         }
     }
 
-    #[test]
-    fn whoever_looked_in_vain_for_a_rendering_that_is_put_back_is_called() {
+    /// A holder's step finds a unit in a queue that it may not be rendered from, and another holder looks in vain
+    /// meanwhile and is about to sleep. What the step did, the calls at the first entry and after the step.
+    fn put_back(frames: u32) -> (Step, u32, u32) {
         let memory = Memory {
             units: &mut [(); 2].map(UnitSlot::new),
             interactions: &mut [const { InteractionSlot::spare(()) }; 2],
@@ -374,18 +392,28 @@ mod tests {
             letters: &mut [const { LetterSlot::new() }],
             queues: &mut [const { QueueSlot::new() }; queue_slots(2, 2, 1, 1)],
         };
+        let calls = Calls::default();
+        let void = Void { calls: &calls, before_entry: AtomicU32::new(0) };
         let config = Config { tokens: 2, ..Config::default() };
-        let pipeline = Pipeline::<Void, _>::new(memory, config, Calls::default())
+        let mut pipeline = Pipeline::<Void<'_>, _>::new(memory, config, &calls)
             .unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(pipeline.run(frames), Ok(()));
         // As after a swap since the frame on display was read: no unit of it is in this queue.
         assert_eq!(pipeline.tables.queues.render[0].push(0), Ok(()));
         let mut worker = pipeline.worker();
         assert!(pipeline.token(()).is_ok_and(|token| worker.hold(token).is_ok()));
-        // Another holder, about to sleep.
+        let mut did = Step::Idle;
         pipeline.bells.holders.sleep_unless(&pipeline.waiting, || {
-            assert_eq!(worker.step(&Void), Ok(Step::Idle));
+            did = worker.step(&void).unwrap_or_else(|error| panic!("{error}"));
             false
         });
-        assert_eq!(*pipeline.waiting.count(), 1);
+        (did, void.before_entry.into_inner(), *calls.count())
+    }
+
+    #[test]
+    fn whoever_looked_in_vain_for_a_rendering_that_is_put_back_is_called() {
+        assert_eq!(put_back(0), (Step::Idle, 0, 1));
+        let before_its_work = 1;
+        assert_eq!(put_back(1), (Step::Worked(Stage::BroadPhase), before_its_work, 1));
     }
 }

@@ -92,6 +92,8 @@ faults! {
     LeavesWithRenderer;
     /// A worker sleeps with the shared renderer.
     SleepsWithRenderer;
+    /// Lost wake-up: who puts the shared renderer back does not look whether a rendering was queued meanwhile.
+    NotLookedAgain;
     /// Lost wake-up: who queues a rendering, or leaves one behind, calls holders, where anyone could do it.
     RenderingCallsHolders;
     /// The gate is armed again after the frame's updates were let go.

@@ -209,6 +209,8 @@ sites! {
     /// Sequentially consistent fence between ceasing to be a sleeper and looking at what is left
     /// behind.
     FENCE_LEAVE = SeqCst;
+    /// Sequentially consistent fence between putting the shared renderer back and looking for what to render.
+    FENCE_PUT_BACK = SeqCst;
     /// Relaxed: how many tokens or readers are left; re-validated by the CAS that follows.
     COUNT_LOOK = Relaxed;
     /// Acquire and Release: the token's renderer moves from holder to holder.

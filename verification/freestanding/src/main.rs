@@ -91,6 +91,8 @@ fn pipeline(config: Config) -> Result<(), Failure> {
         frames(black_box(&pipeline))?;
     }
     let pipeline = black_box(&mut pipeline);
+    pipeline.set_homes(|unit| black_box(unit.0));
+    shared(pipeline)?;
     pipeline.take_letters(|unit, from, letter| {
         black_box((unit, from, letter));
     });
@@ -126,6 +128,21 @@ fn frames(pipeline: &Pipeline<'_, Ve, Awake>) -> Result<(), Failure> {
     let shown = holder.release().map(|token| token.into_renderer());
     let swapped = pipeline.frame().0.wrapping_sub(first.0);
     if shown == Some(FRAMES) && swapped == FRAMES { Ok(()) } else { Err(Failure::Wrong) }
+}
+
+/// A run whose renderer is left to all workers.
+fn shared(pipeline: &mut Pipeline<'_, Ve, Awake>) -> Result<(), Failure> {
+    pipeline.run(black_box(FRAMES))?;
+    pipeline.share(0).map_err(|(_, full)| full)?;
+    while !pipeline.finished() {
+        let mut workers = [0, 1].map(|home| pipeline.worker_at(home));
+        for _ in 0..black_box(7) {
+            for worker in &mut workers {
+                turn(worker)?;
+            }
+        }
+    }
+    if pipeline.take_back() == Some(FRAMES) { Ok(()) } else { Err(Failure::Wrong) }
 }
 
 fn turn(worker: &mut Worker<'_, '_, Ve, Awake>) -> Result<(), Failure> {

@@ -15,6 +15,7 @@ const EXPECTED_SURVIVORS: &[(&str, Ordering, &str)] = &[];
 /// The models to try on a site, by the start of its name; the first that fails ends the search.
 fn suspects(name: &str) -> &'static [Model] {
     match name.split('_').next().unwrap_or_default() {
+        "FENCE" if name == site::FENCE_PUT_BACK.name => shared::ALL,
         "RING" => ring::ALL,
         "COUNTDOWN" => countdown::ALL,
         "ARRIVALS" => arrivals::ALL,

@@ -29,6 +29,7 @@ fn killer(fault: Fault) -> &'static str {
         LeavesWithCarry => "pipeline::spatial_after_update",
         LeavesWithRenderer => "shared::leaver_calls",
         SleepsWithRenderer => "shared::sleepers_end",
+        NotLookedAgain => "shared::busy_after_it",
         RenderingCallsHolders => "shared::leaver_calls",
         GateArmedLate => "pipeline::solitary_unit",
         RendersArmedLate => "pipeline::two_holders_at_a_swap",

@@ -81,8 +81,9 @@ const LOOK: u32 = 9 + (2 + POP + 1 + PUSH);
 /// Rendering is looked for first, then anything at home and elsewhere, and at most four times at each home
 /// what was seen may be gone.
 const FIND: u32 = 13 + HOMES as u32 * 4 * LOOK;
-/// A shared renderer is taken if a rendering is seen, or put back if none is.
-const SHARE_RENDERER: u32 = 3 + 2;
+/// A shared renderer is taken if a rendering is seen; or put back if none is, and taken again if one is seen behind
+/// a fence.
+const SHARE_RENDERER: u32 = 3 + 1 + 1 + 3 + 2;
 /// Where nobody takes away what was seen.
 const FIND_ALONE: u32 = 3 + (HOMES as u32 - 1) * 9 + LOOK;
 /// Once round a loop whose word another thread changed.

@@ -4,35 +4,56 @@
 
 use super::ve::{Setup, build, step, verify};
 use super::{Model, Role, check, together};
+use dualframe_core_model::frame::Entry;
 use dualframe_core_model::stage::Stage;
 use dualframe_core_model::worker::Step;
 
-pub(crate) const ALL: &[Model] =
-    &[("shared::leaver_calls", leaver_calls), ("shared::sleepers_end", sleepers_end)];
+pub(crate) const ALL: &[Model] = &[
+    ("shared::leaver_calls", leaver_calls),
+    ("shared::sleepers_end", sleepers_end),
+    ("shared::busy_after_it", busy_after_it),
+];
 
 /// Two units that do not interact, one at each worker's home, and a renderer left to both workers.
 const SHARED: Setup = Setup { solitary_from: 0, frames: 1, shared: true, ..Setup::DEFAULT };
 
-/// Two workers who wait before every step: both come to an end. The outcome is how many units each rendered:
-/// one that another is about to render may be rendered by that one too.
+/// Two workers who wait before every step. How many units each rendered, when both have come to an end.
+fn rendered(setup: Setup, order: usize) -> [u32; 2] {
+    let (pipeline, world) = build(setup);
+    let role = |home: u32| -> Role<u32> {
+        Box::new(move || {
+            let mut worker = pipeline.worker_at(home);
+            let mut rendered = 0;
+            while !pipeline.finished() {
+                worker.wait();
+                let did = step(&mut worker, world);
+                rendered += u32::from(did == Step::Worked(Stage::Render));
+            }
+            rendered
+        })
+    };
+    let rendered = together(order, vec![role(0), role(1)]);
+    verify(pipeline, world);
+    [rendered[0], rendered[1]]
+}
+
+/// Both come to an end. The outcome is how many units each rendered: one that another is about to render may be
+/// rendered by that one too.
 fn sleepers_end() {
     check("shared::sleepers_end", Some(2), 2, [[0, 2], [1, 1], [2, 0]], |order| {
-        let (pipeline, world) = build(SHARED);
-        let role = |home: u32| -> Role<u32> {
-            Box::new(move || {
-                let mut worker = pipeline.worker_at(home);
-                let mut rendered = 0;
-                while !pipeline.finished() {
-                    worker.wait();
-                    let did = step(&mut worker, world);
-                    rendered += u32::from(did == Step::Worked(Stage::Render));
-                }
-                rendered
-            })
-        };
-        let rendered = together(order, vec![role(0), role(1)]);
-        verify(pipeline, world);
-        [rendered[0], rendered[1]]
+        rendered(SHARED, order)
+    });
+}
+
+/// Whoever puts the renderer back may go on with work that takes long, here with unit 0's entry into frame 1, until
+/// unit 1 is rendered: of a rendering that was queued meanwhile somebody knows who is awake. The outcome is how many
+/// units each rendered.
+fn busy_after_it() {
+    let each = (0..=4).map(|rendered| [rendered, 4 - rendered]);
+    check("shared::busy_after_it", Some(1), 2, each, |order| {
+        let entry = Entry::AfterRender;
+        let setup = Setup { far: true, entry, shared: true, patient: true, ..Setup::DEFAULT };
+        rendered(setup, order)
     });
 }
 

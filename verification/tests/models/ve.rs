@@ -59,6 +59,8 @@ pub(crate) struct Setup {
     pub(crate) tokens: u32,
     /// Whether the renderer is left to all workers.
     pub(crate) shared: bool,
+    /// Whether unit 0's entry into frame 1 takes until unit 1 is rendered in frame 0.
+    pub(crate) patient: bool,
     /// Units from this number on are solitary.
     pub(crate) solitary_from: u32,
     /// Whether unit 0 posts a letter to the last unit in every update.
@@ -82,6 +84,7 @@ impl Setup {
         entry: Entry::AfterUpdate,
         tokens: 1,
         shared: false,
+        patient: false,
         solitary_from: u32::MAX,
         letters: false,
         fail: false,
@@ -152,6 +155,15 @@ impl Environment for World {
         let near = !self.setup.far;
         note(|did| (did.tests, did.found) = (did.tests + 1, did.found + u32::from(near)));
         near
+    }
+
+    fn interacts_within(&self, body: &Body) -> bool {
+        if self.setup.patient && (body.id, body.updates) == (0, 1) {
+            while !lock(&self.journal).contains(&Rendered(1, 0)) {
+                loom::thread::yield_now();
+            }
+        }
+        false
     }
 
     fn interact(
