@@ -1,5 +1,7 @@
 //! What can go wrong with a graphics adapter.
 
+use std::any::Any;
+
 use thiserror::Error;
 
 /// Why there is no picture, or no further one.
@@ -78,4 +80,11 @@ pub enum GraphicsError {
         /// What its driver says.
         reason: String,
     },
+}
+
+/// What a panic says, if it says anything: drivers and their wrappers panic where they should fail.
+#[must_use]
+pub fn words_of(panic: &(dyn Any + Send)) -> Option<&str> {
+    let owned = panic.downcast_ref::<String>().map(String::as_str);
+    owned.or_else(|| panic.downcast_ref().copied())
 }

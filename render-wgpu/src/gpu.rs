@@ -1,6 +1,5 @@
 //! The graphics device and how it is chosen.
 
-use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -9,7 +8,7 @@ use wgpu::{
     InstanceDescriptor, PollType, PowerPreference, Queue, RequestAdapterOptions, Surface,
 };
 
-use crate::error::GraphicsError;
+use crate::error::{GraphicsError, words_of};
 
 /// A graphics device. What happens to it, it notes: none of its calls panics when it fails.
 pub struct Gpu {
@@ -111,7 +110,7 @@ impl Gpu {
         let reason = match polled {
             Ok(Ok(_)) => return Ok(()),
             Ok(Err(error)) => one_line(&error),
-            Err(panic) => one_line(&words(&*panic)),
+            Err(panic) => one_line(&words_of(&*panic).unwrap_or("it panicked")),
         };
         note(&self.failure, reason.clone());
         Err(self.failure().unwrap_or(GraphicsError::Lost { reason }))
@@ -127,12 +126,6 @@ impl Gpu {
 /// Keeps the first failure: the later ones follow from it.
 fn note(failure: &Mutex<Option<String>>, reason: String) {
     failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(reason);
-}
-
-/// What a panic says.
-fn words(panic: &(dyn Any + Send)) -> &str {
-    let owned = panic.downcast_ref::<String>().map(String::as_str);
-    owned.or_else(|| panic.downcast_ref().copied()).unwrap_or("it panicked")
 }
 
 /// Has the device note what goes wrong.

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use dualframe_render_wgpu::camera::Camera;
-use dualframe_render_wgpu::error::GraphicsError;
+use dualframe_render_wgpu::error::{GraphicsError, words_of};
 use dualframe_render_wgpu::gpu::Gpu;
 use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_render_wgpu::picture::{Picture, read_texture};
@@ -81,9 +81,7 @@ fn event_loop() -> Result<EventLoop<()>, GraphicsError> {
     match made {
         Ok(made) => made.map_err(|_| GraphicsError::NoDisplay),
         Err(panic) => {
-            let text = panic.downcast_ref::<&str>().copied().map(str::to_owned);
-            let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
-            let reason = text.unwrap_or("the display refused".to_owned());
+            let reason = words_of(&*panic).unwrap_or("the display refused");
             Err(GraphicsError::Surface { reason: reason.trim_end_matches('.').to_owned() })
         }
     }
