@@ -121,6 +121,7 @@ impl VeManager {
     pub fn settings(&self) -> Settings {
         let threads = match self.settings.executor {
             ExecutorKind::Pipeline => self.pool.threads(),
+            ExecutorKind::Serial => 1,
             _ => self.settings.threads,
         };
         Settings { threads, ..self.settings }
@@ -189,5 +190,21 @@ impl VeManager {
     #[must_use]
     pub fn stage_seconds(&self) -> Vec<StageSeconds> {
         self.executor.stage_seconds()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::ParticleScene;
+
+    #[test]
+    fn as_many_threads_as_there_are() {
+        for (executor, threads) in [(ExecutorKind::Serial, 1), (ExecutorKind::Pipeline, 3)] {
+            let settings = Settings { executor, threads: 3, ..Settings::default() };
+            let scene = ParticleScene::new(1).build().expect("a valid scene");
+            let manager = VeManager::new(scene, settings).expect("valid settings");
+            assert_eq!(manager.settings().threads, threads, "{executor:?}");
+        }
     }
 }

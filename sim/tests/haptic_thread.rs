@@ -11,9 +11,9 @@ use dualframe_sim::device::link::{HapticLink, SimulationEnd, ToolState};
 use dualframe_sim::device::model::LocalModel;
 use dualframe_sim::device::mouse::Mouse;
 use dualframe_sim::device::operator::SimulatedDevice;
-use dualframe_sim::device::thread::{HapticThread, LoopError, RATE};
+use dualframe_sim::device::thread::{HapticLoop, HapticThread, LoopError, RATE};
 use dualframe_sim::device::{DeviceDescription, DeviceError, DeviceSample, HapticDevice, Wrench};
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 
 /// A device that counts, and that fails at each third reading.
 struct Faulty {
@@ -167,5 +167,60 @@ fn rates_are_the_devices() {
             assert!(matches!(error, LoopError::Rate { .. }));
             assert!(error.to_string().contains("takes 500 to 4000 Hz"), "{error}");
         });
+    }
+}
+
+/// A device at which something has gone wrong.
+struct Astray;
+
+impl HapticDevice for Astray {
+    fn description(&self) -> DeviceDescription {
+        SimulatedDevice::DESCRIPTION
+    }
+
+    fn read(&mut self, _time: f64) -> Result<DeviceSample, DeviceError> {
+        Ok(DeviceSample::at(Vec3::Y * -1e36))
+    }
+
+    fn write(&mut self, wrench: Wrench) -> Result<(), DeviceError> {
+        assert!(wrench.force.is_finite() && wrench.torque.is_finite(), "{wrench:?}");
+        Ok(())
+    }
+}
+
+/// A wall below y = 0, of 2 N/mm.
+fn wall() -> LocalModel {
+    let gradient = Mat3::from_diagonal(Vec3::new(0.0, -2_000.0, 0.0));
+    LocalModel { gradient, normal: Some(Vec3::Y), ..LocalModel::FREE }
+}
+
+#[test]
+fn a_place_where_no_hand_is_is_no_place() {
+    let mut link = HapticLink::new();
+    let (end, mut simulation) = link.split();
+    let mut haptics = HapticLoop::new(Astray, end, ForceSettings::default());
+    simulation.deliver(wall()).expect("finite");
+    for tick in 1..=3 {
+        assert_eq!(haptics.tick(f64::from(tick) / RATE), Wrench::default());
+    }
+    let tool = simulation.tool();
+    assert_eq!((tool.fault, tool.ticks.failed), (Some(DeviceError::NonFinite), 3));
+}
+
+#[test]
+fn a_link_that_is_split_anew_has_forgotten() {
+    let mut link = HapticLink::new();
+    for _ in 0..2 {
+        let (end, mut simulation) = link.split();
+        assert_eq!(simulation.tool().ticks.due, 0);
+        let device = Faulty { reads: Arc::default(), writes: Arc::default() };
+        let mut haptics = HapticLoop::new(device, end, ForceSettings::default());
+        haptics.tick(1.0 / RATE);
+        assert_eq!(simulation.tool().forces.models, 0);
+        simulation.deliver(wall()).expect("finite");
+        // Two of these readings fail.
+        (2..=4).for_each(|tick| _ = haptics.tick(f64::from(tick) / RATE));
+        let tool = simulation.tool();
+        assert_eq!((tool.forces.models, tool.ticks.due), (1, 4));
     }
 }

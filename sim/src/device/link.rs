@@ -15,8 +15,8 @@ const SLOTS: usize = 3;
 /// The tool, as the haptic loop last had it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolState {
-    /// When it was read, in seconds on the loop's clock. A local model that is computed from it takes it
-    /// over.
+    /// When it was read, in seconds on the loop's clock; with a fault, when that was tried, and the sample is an older
+    /// one. A local model that is computed from it takes it over.
     pub time: f64,
     /// The last sample.
     pub sample: DeviceSample,
@@ -29,6 +29,23 @@ pub struct ToolState {
     /// What was exerted, and how good it was.
     pub forces: Forces,
 }
+
+impl ToolState {
+    /// Before the first tick.
+    fn unseen() -> Self {
+        Self {
+            time: 0.0,
+            sample: DeviceSample::at(Vec3::ZERO),
+            wrench: Wrench::default(),
+            fault: None,
+            ticks: Ticks::default(),
+            forces: Forces::default(),
+        }
+    }
+}
+
+/// What the loop goes by until it is told something.
+const NO_MODEL: Numbered = (0, LocalModel::FREE);
 
 /// A local model with its number, from 1; 0 for none.
 pub(super) type Numbered = (u64, LocalModel);
@@ -50,31 +67,24 @@ impl HapticLink {
     /// A link over which nothing was said.
     #[must_use]
     pub fn new() -> Self {
-        let tool = ToolState {
-            time: 0.0,
-            sample: DeviceSample::at(Vec3::ZERO),
-            wrench: Wrench::default(),
-            fault: None,
-            ticks: Ticks::default(),
-            forces: Forces::default(),
-        };
-        Self { tools: Latest::new(tool), models: Latest::new((0, LocalModel::FREE)) }
+        Self { tools: Latest::new(ToolState::unseen()), models: Latest::new(NO_MODEL) }
     }
 
-    /// The loop's end and the simulation's.
+    /// The loop's end and the simulation's. Nothing was said over the link then: what was before is forgotten.
     #[expect(
         clippy::missing_panics_doc,
         reason = "cells that are borrowed alone have no reader yet"
     )]
     pub fn split(&mut self) -> (LoopEnd<'_>, SimulationEnd<'_>) {
-        let (tools_in, tools_out) = self.tools.split();
-        let (models_in, models_out) = self.models.split();
-        let mut models_out = models_out.reader().expect("the first reader");
+        let (mut tools_in, tools_out) = self.tools.split();
+        let (mut models_in, models_out) = self.models.split();
+        tools_in.publish(ToolState::unseen());
+        models_in.publish(NO_MODEL);
+        let models_out = models_out.reader().expect("the first reader");
         let tools_out = tools_out.reader().expect("the first reader");
-        let (delivered, _) = models_out.read();
         (
             LoopEnd { tools: tools_in, models: models_out },
-            SimulationEnd { tools: tools_out, models: models_in, delivered },
+            SimulationEnd { tools: tools_out, models: models_in, delivered: 0 },
         )
     }
 }

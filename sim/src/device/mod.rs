@@ -51,6 +51,9 @@ pub struct DeviceSample {
     pub buttons: u32,
 }
 
+/// How far from the origin a tool may be along each axis, in metres; usually 100, farther than any hand.
+pub const FARTHEST: f32 = 100.0;
+
 impl DeviceSample {
     /// A tool at a place, upright, no button pressed.
     #[must_use]
@@ -58,10 +61,11 @@ impl DeviceSample {
         Self { position, orientation: Quat::IDENTITY, buttons: 0 }
     }
 
-    /// Whether every number of it is finite.
+    /// Whether every number of it is finite, and its place at most [`FARTHEST`] away: what is computed from it is
+    /// finite then, too.
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.position.is_finite() && self.orientation.is_finite()
+        self.position.abs().cmple(Vec3::splat(FARTHEST)).all() && self.orientation.is_finite()
     }
 }
 
@@ -110,8 +114,8 @@ pub enum DeviceError {
     /// It did not answer within the time that its driver allows.
     #[error("the device did not answer in time")]
     Timeout,
-    /// A position or an orientation that is no number.
-    #[error("the device told a pose that is not finite")]
+    /// A position or an orientation that is no number, or a place where no hand is.
+    #[error("the device told a pose that is not finite, or more than {FARTHEST} m away")]
     NonFinite,
     /// The driver panicked: the loop is over.
     #[error("the device's driver has panicked, and its haptic loop is over")]

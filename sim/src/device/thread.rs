@@ -134,14 +134,14 @@ impl<'scope> HapticThread<'scope> {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let (tell, told) = mpsc::sync_channel(1);
+        let mut ticking = HapticLoop::new(device, end, settings);
         let thread = Builder::new().name("haptics".into()).spawn_scoped(scope, move || {
             let priority = Priority::raise();
-            let mut ticking = HapticLoop::new(device, end, settings);
             // Who asked may have gone meanwhile.
             let _ = tell.send(priority);
             ticking.run(Duration::from_secs_f64(1.0 / rate), &stopped);
         })?;
-        let gone = || Priority::Ordinary { reason: "the device's description failed".into() };
+        let gone = || Priority::Ordinary { reason: "its thread has ended".into() };
         let priority = told.recv().unwrap_or_else(|_| gone());
         Ok(Self { stop, priority, thread: Some(thread) })
     }

@@ -34,7 +34,7 @@
 //!   - 4, checkpoint: number, how many objects; 8 bytes each, their hashes. The state's hash follows.
 //! - End: numbers, of frames, messages, controls, additions and checkpoints.
 //!
-//! A chunk is written about once a second. A file that is cut off or altered is whole up to its first
+//! A chunk is written about once a second, at most once every 60 frames. A file that is cut off or altered is whole up to its first
 //! chunk that is not, and plays until the F of the last one that is.
 
 mod chunk;

@@ -17,7 +17,8 @@ use crate::object::ObjectId;
 use crate::render::Renderer;
 use crate::state::object_hash;
 
-/// How long what was recorded may wait to be written; usually 1 s, which a crash then costs.
+/// How long what was recorded may wait to be written, looked at every [`CHECKPOINT_FRAMES`]; usually 1 s. A crash costs
+/// the longer of both.
 const MOST_WAITING: Duration = Duration::from_secs(1);
 /// Bytes that are written at once even if they have not waited; usually 256 KiB.
 const MANY_BYTES: usize = 1 << 18;
@@ -118,6 +119,8 @@ impl<W: Write> Recorder<W> {
     /// # Errors
     /// The recording has failed before, or the bytes are too many.
     pub fn objects(&mut self, manager: &VeManager, spec: &[u8]) -> Result<(), RecordError> {
+        // The state is another one.
+        self.checked = None;
         self.stop(manager.frame(), &Stop::Objects(spec.to_owned()))
     }
 

@@ -68,7 +68,8 @@ impl Track {
         }
         // Acquire: if a word read was a newer span's, what was written before that one is counted now.
         fence(Ordering::Acquire);
-        let newer = self.written.load(Ordering::Relaxed) - written;
+        // Less, round about, where two threads record on one number: then nothing is known to be whole.
+        let newer = self.written.load(Ordering::Relaxed).wrapping_sub(written);
         // Each took the place of the oldest, and the one after them may have been under way.
         spans.truncate(first + kept.saturating_sub(newer) as usize);
         spans[first..].reverse();

@@ -1,6 +1,6 @@
 //! What is read is what was written, where it was written.
 
-use dualframe_sim::image::{Grid, Image, Thresholds, Voxel, save, write};
+use dualframe_sim::image::{Grid, Image, ImageError, Thresholds, Voxel, save, write};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use proptest::prelude::*;
 
@@ -152,6 +152,9 @@ fn saved() {
     let image = read(&Nifti::small().bytes());
     for name in ["volume.nii", "volume.nii.gz"] {
         let path = folder.path().join(name);
+        // Left there by a process of this number that was killed.
+        let left = folder.path().join(format!("{name}.{}.0.part", std::process::id()));
+        std::fs::write(&left, "half").expect("the folder takes it");
         save(&path, image.grid(), image.voxels()).expect("the folder takes it");
         assert_eq!(Image::open(&path).expect("it was just written"), image, "{name}");
         let packed = std::fs::read(&path).expect("it was just written").starts_with(&[0x1f, 0x8b]);
@@ -243,6 +246,11 @@ fn nrrd_of_spacings() {
     let image = read(&nrrd_bytes(&lines, &Nifti::small().data));
     assert_eq!(image.voxels(), read(&Nifti::small().bytes()).voxels());
     assert!(image.grid().spacing().abs_diff_eq(DVec3::new(0.5e-3, 0.6e-3, 0.7e-3), 1e-12));
+    // Which way its axes run in that space is not said.
+    lines.push("space: left-posterior-superior".to_owned());
+    let file = nrrd_bytes(&lines, &Nifti::small().data);
+    let error = Image::read(&file[..], file.len() as u64).expect_err("it lacks them");
+    assert!(matches!(error, ImageError::Missing { name: "space directions" }), "{error}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use dualframe_sim::record::{Flaw, Header, RecordError, Recorder, ReplayError};
 use dualframe_sim::render::NullRenderer;
 use dualframe_sim::scene::ParticleScene;
 
-use crate::session::{PARTICLES, read, replay, session, spec};
+use crate::session::{PARTICLES, add, read, replay, session, spec};
 
 const FRAMES: u64 = 200;
 
@@ -96,6 +96,24 @@ fn a_session_that_did_not_begin() {
     manager.run(1, &mut NullRenderer::new(), &mut |_| {}).expect("it runs");
     let begun = Recorder::begin(Vec::new(), &Header::of(&spec), &manager);
     assert!(matches!(begun, Err(RecordError::Begun { frame: 1 })));
+}
+
+#[test]
+fn objects_that_were_added_last_are_checked() {
+    let spec = ParticleScene::new(1);
+    let scene = spec.build().expect("a valid scene");
+    let manager = VeManager::new(scene, serial()).expect("valid settings");
+    let mut recorder = Recorder::begin(Vec::new(), &Header::of(&spec), &manager).expect("a start");
+    recorder.checkpoint(&manager).expect("it is recorded");
+    let velocity = [0; 12];
+    recorder.objects(&manager, &velocity).expect("it is recorded");
+    let mut scene = manager.into_scene();
+    add(&mut scene, &velocity);
+    let manager = VeManager::new(scene, serial()).expect("valid settings");
+    let (file, totals) = recorder.finish(&manager).expect("it is written");
+    assert_eq!((totals.additions, totals.checkpoints), (1, 2));
+    let played = replay(&file, serial(), 10).expect("a header");
+    assert!(played.error.is_none());
 }
 
 #[derive(Debug)]

@@ -1,8 +1,8 @@
 //! Volumes out.
 
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::io::{self, BufWriter, ErrorKind, Write};
+use std::path::{Path, PathBuf};
 use std::process;
 
 use flate2::Compression;
@@ -58,9 +58,7 @@ pub fn save<V: Voxel>(path: &Path, grid: &Grid, voxels: &[V]) -> Result<(), File
         }
         // A link stays one.
         let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-        let mut beside = place.clone().into_os_string();
-        beside.push(format!(".{}.part", process::id()));
-        let file = File::create_new(&beside)?;
+        let (file, beside) = create_beside(&place)?;
         let written = (|| {
             if let Ok(there) = there {
                 file.set_permissions(there.permissions())?;
@@ -78,6 +76,20 @@ pub fn save<V: Voxel>(path: &Path, grid: &Grid, voxels: &[V]) -> Result<(), File
     save().map_err(|source| FileError { path: path.to_owned(), source })
 }
 
+/// A new file beside one, and where it is.
+fn create_beside(place: &Path) -> io::Result<(File, PathBuf)> {
+    for number in 0_u64.. {
+        let mut beside = place.as_os_str().to_owned();
+        beside.push(format!(".{}.{number}.part", process::id()));
+        match File::create_new(&beside) {
+            // Another thread's, or left there by a process of the same number that was killed.
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            created => return Ok((created?, beside.into())),
+        }
+    }
+    Err(ErrorKind::AlreadyExists.into())
+}
+
 fn fill<V: Voxel>(file: &File, packs: bool, grid: &Grid, voxels: &[V]) -> Result<(), ImageError> {
     let mut file = BufWriter::new(file);
     if packs {
@@ -93,7 +105,8 @@ fn fill<V: Voxel>(file: &File, packs: bool, grid: &Grid, voxels: &[V]) -> Result
 /// Writes a volume as NIfTI-1, low bytes first and lengths in millimetres: `voxels` are the image's, x
 /// fastest, and come to stand in the order, and with the affine map, of the file that `grid` came from.
 ///
-/// The map is written as the sform, in 32-bit floats: that of a NIfTI file's sform comes back exactly.
+/// The map is written as the sform, in 32-bit floats: that of a NIfTI file's sform comes back exactly, if it is
+/// in millimetres.
 ///
 /// # Errors
 /// Another number of values than voxels; the sink's.

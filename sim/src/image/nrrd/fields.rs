@@ -61,13 +61,14 @@ fn insert(fields: &mut BTreeMap<String, String>, line: &str) -> Result<(), Image
     if line.starts_with('#') {
         return Ok(());
     }
+    // A key with its value, which mean nothing here; it may have a colon, but none before a space.
+    let is_key = |at| line.find(": ").is_none_or(|field| at < field);
+    if line.find(":=").is_some_and(is_key) {
+        return Ok(());
+    }
     let Some((name, value)) = line.split_once(':') else {
         return wrong("a field, a comment or a key with its value");
     };
-    // A key with its value, which mean nothing here.
-    if value.starts_with('=') {
-        return Ok(());
-    }
     let name = name.trim().to_lowercase();
     match fields.insert(name, value.trim().to_owned()) {
         None => Ok(()),

@@ -104,6 +104,10 @@ fn axes(fields: &Fields) -> Result<(Vec<Axis>, DVec3), ImageError> {
     let lengths = lengths(fields)?;
     let Some(directions) = fields.get("space directions") else {
         let steps = spacings(fields.require("spacings")?, metres_per_unit(fields.get("units"))?)?;
+        if fields.get("space").is_some() {
+            // Which way the axes run in it is not said.
+            return Err(ImageError::Missing { name: "space directions" });
+        }
         return Ok((joined("spacings", lengths, steps)?, DVec3::ZERO));
     };
     let unit = metres_per_unit(fields.get("space units"))?;
