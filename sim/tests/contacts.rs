@@ -168,3 +168,20 @@ fn damping_never_pulls_and_friction_only_stops() {
     near(push(Vec3::X * 9.0), Vec3::new(-2.5, 5.0, 0.0));
     near(push(Vec3::X * 2.0), Vec3::new(-2.0, 5.0, 0.0));
 }
+
+#[test]
+fn friction_stops_two_nodes_on_each_other() {
+    let mut stages = stages(POINTS, POINTS, NodeSpheres::default());
+    let (detection, response) = (NodeSpheres::default(), Penalty::new(100.0, 0.0, 0.5));
+    let response = Box::new(response.expect("positive values"));
+    stages.rules = dualframe_sim::interaction::Rules::new();
+    let pair = InteractionPair { detection: Box::new(detection), response };
+    stages.rules.model(POINTS, POINTS, pair).expect("the first rule");
+    let mut passing = point_at(0, Vec3::Y * 0.15);
+    passing.geometry.as_mesh_mut().expect("a mesh").set_velocity(Vec3::X * 0.2);
+    let (told, _) = interact(&stages, passing, point_at(1, Vec3::ZERO));
+    // 5 N by depth, which would bear 2.5 N s; half of 0.2 m/s for each of two nodes of 1 kg.
+    let impulse = Vec3::new(-0.1, 5.0, 0.0);
+    assert_impulse(&told[0][0], 0, 0, impulse);
+    assert_impulse(&told[1][0], 1, 0, -impulse);
+}

@@ -117,6 +117,27 @@ fn a_perforator_stops_at_the_inner_table() {
 }
 
 #[test]
+fn a_perforator_that_was_released_has_to_engage_anew() {
+    let (bone, workpieces) = bone();
+    let mut manager = manager(bone, OUTER + Vec3::Z * 0.005, workpieces);
+    let turns = |manager: &VeManager| {
+        read(manager, TOOL, |tool| Tool::of(tool).expect("a tool").work().turns)
+    };
+    take_up(&manager, Instrument::Perforator);
+    move_to(&manager, OUTER - Vec3::Z * 0.03, true);
+    run(&mut manager, 60);
+    assert!(turns(&manager), "it turns when it is pressed on bone");
+    let in_air = OUTER + Vec3::Z * 0.02;
+    move_to(&manager, in_air, false);
+    run(&mut manager, 120);
+    move_to(&manager, in_air, true);
+    for frame in 0..10 {
+        run(&mut manager, 1);
+        assert!(!turns(&manager), "it turns in the air, frame {frame}");
+    }
+}
+
+#[test]
 fn a_burr_drills_only_while_it_is_pressed() {
     let (bone, workpieces) = bone();
     let mut manager = manager(bone, OUTER + Vec3::Z * 0.005, workpieces);
@@ -215,6 +236,30 @@ fn a_scalpel_cuts_only_while_it_is_pressed() {
         run(&mut manager, 4);
         assert_eq!(nodes(&manager) > whole, pressed);
     }
+}
+
+#[test]
+fn a_scalpel_that_is_pressed_anew_begins_a_new_cut() {
+    let (patch, workpieces) = patch();
+    let deep = Vec3::Z * -0.004;
+    let mut manager = manager(patch, MIDDLE + Vec3::new(-0.013, 0.001, 0.0) + deep, workpieces);
+    take_up(&manager, Instrument::Scalpel);
+    let within = |manager: &VeManager, way: f32| {
+        read(manager, OTHER, |patch| {
+            let rest = Tissue::of(patch).expect("tissue").rest();
+            rest.iter().filter(|node| (node.x - MIDDLE.x).abs() < way).count()
+        })
+    };
+    let [all, middle] = [1.0, 0.003].map(|way| within(&manager, way));
+    for step in 0..40 {
+        let along = -0.013 + 0.000_65 * step as f32;
+        let is_between = along.abs() < 0.006;
+        move_to(&manager, MIDDLE + Vec3::new(along, 0.001, 0.0) + deep, !is_between);
+        run(&mut manager, 1);
+    }
+    run(&mut manager, 4);
+    assert!(within(&manager, 1.0) > all, "nothing is cut");
+    assert_eq!(within(&manager, 0.003), middle, "what is between the cuts is parted");
 }
 
 #[test]

@@ -12,6 +12,7 @@ use super::instrument::EDGE;
 use super::{Behavior, Felt, Grasp, Hold, Input, Instrument, LetGo, tissue};
 use crate::device::DeviceSample;
 use crate::geometry::{Blade, Geometry, Rigid};
+use crate::interaction::Contact;
 use crate::message::{Custom, Message};
 use crate::object::{Object, ObjectId};
 
@@ -93,6 +94,8 @@ pub struct Tool {
     workpieces: Workpieces,
     /// Where the edge was in the frame before, if it was this instrument's.
     before: Option<Blade>,
+    /// Whether the instrument was taken up since the last update.
+    is_new: bool,
     holds: bool,
     /// Of the hand on a burr or a craniotome, and on a perforator.
     feeds: [Feed; 2],
@@ -127,6 +130,7 @@ impl Tool {
             device,
             workpieces,
             before: None,
+            is_new: false,
             holds: false,
             feeds,
             perforator: Perforator::new(),
@@ -216,6 +220,10 @@ impl Tool {
     /// How fast the bit turns in this frame, in radians per second.
     fn turn(&mut self) -> f32 {
         let pressed = self.is_pressed();
+        if !pressed {
+            // Its clutch lets go.
+            self.perforator = Perforator::new();
+        }
         match self.instrument {
             Instrument::Perforator if pressed => self.perforator.turn(self.reaction.tip),
             Instrument::Burr if pressed => BURR_SPIN,
@@ -225,10 +233,11 @@ impl Tool {
     }
 
     /// Does what the instrument does, from `now` on.
-    fn act(&mut self, rigid: &Rigid, now: Blade, input: &mut Input<'_>) {
+    fn act(&mut self, rigid: &Rigid, now: Blade, is_new: bool, input: &mut Input<'_>) {
         let by = input.object;
         let pressed = self.is_pressed();
-        if self.holds && !matches!(self.instrument, Instrument::Forceps | Instrument::Hook) {
+        let holds = matches!(self.instrument, Instrument::Forceps | Instrument::Hook) && !is_new;
+        if self.holds && !holds {
             self.let_go(input);
             self.holds = false;
         }
@@ -276,20 +285,24 @@ impl Tool {
     }
 
     /// Notes what this frame's contacts did, and lets a turning bit take bone away.
-    fn feel(&mut self, geometry: &Geometry, input: &mut Input<'_>) {
+    fn feel(&mut self, geometry: &Geometry, is_new: bool, input: &mut Input<'_>) {
         let Workpieces { bone, pieces, .. } = &self.workpieces;
         let is_bone = |other: ObjectId| bone.contains(&other) || pieces.contains(&other);
-        let on_bone = input.contacts().filter(|contact| is_bone(contact.other));
-        let reaction = Reaction::new(on_bone, input.time_step);
+        // What the instrument before it felt is not a new one's.
+        let felt = |contact: &Contact| !is_new && is_bone(contact.other);
+        let reaction = Reaction::new(input.contacts().filter(felt), input.time_step);
         let [tissue, dura] = [None, Some(&self.workpieces.dura)].map(|only| {
             let counts = |other| !is_bone(other) && only.is_none_or(|only| only.contains(&other));
             let contacts = input.contacts().filter(|contact| counts(contact.other));
             Reaction::new(contacts, input.time_step).force
         });
         if let Some(burr) = self.burr(geometry).filter(|burr| burr.spin != 0.0) {
-            let load = self.feed().map_or(0.0, |feed| feed.load(&reaction));
             for &bone in bone.iter().chain(pieces) {
-                if input.contacts().any(|contact| contact.other == bone) {
+                let touches = |contact: &Contact| !is_new && contact.other == bone;
+                if input.contacts().any(|contact| touches(&contact)) {
+                    // As hard as it is pressed on this one.
+                    let own = Reaction::new(input.contacts().filter(touches), input.time_step);
+                    let load = self.feed().map_or(0.0, |feed| feed.load(&own));
                     input.post(bone, Message::Custom(Box::new(Erode { burr, load })));
                 }
             }
@@ -313,7 +326,8 @@ fn tell<'a, C: Custom + 'static>(
 
 impl Behavior for Tool {
     fn update(&mut self, geometry: &mut Geometry, input: &mut Input<'_>) {
-        self.feel(geometry, input);
+        let is_new = std::mem::take(&mut self.is_new);
+        self.feel(geometry, is_new, input);
         let Some(rigid) = geometry.as_rigid_mut() else { return };
         self.spin = self.turn();
         let tip = rigid.pose.translation;
@@ -321,7 +335,7 @@ impl Behavior for Tool {
         rigid.velocity = (next - tip) / input.time_step;
         rigid.pose = Pose::from_parts(next, self.device.orientation);
         let blade = Blade { tip: next, heel: next + axis(self.device.orientation) * EDGE };
-        self.act(rigid, blade, input);
+        self.act(rigid, blade, is_new, input);
         self.before = Some(blade);
         rigid.shape = self.shapes[self.instrument as usize].clone();
     }
@@ -333,8 +347,7 @@ impl Behavior for Tool {
                 self.instrument = instrument;
                 self.before = None;
                 self.perforator = Perforator::new();
-                // What the other instrument felt, and how its bit turned, is not this one's.
-                self.reaction = Reaction::default();
+                self.is_new = true;
                 self.spin = 0.0;
             }
             _ => {}

@@ -11,7 +11,7 @@ use crate::geometry::Geometry;
 use crate::object::Object;
 
 /// Pushes touching objects apart along the contact's normal, by a spring and a dashpot, and never
-/// pulls; where there is friction, it is Coulomb's, limited so that it stops a node at most.
+/// pulls; where there is friction, it is Coulomb's, limited so that each touch stops its two ends on each other at most.
 ///
 /// Between nodes the force acts along the line of their centres on both alike, so without friction
 /// linear and angular momentum are kept up to rounding.
@@ -66,7 +66,11 @@ impl Penalty {
         if self.friction == 0.0 || speed == 0.0 {
             return push;
         }
-        let stopping = mass(bodies[0], first).min(mass(bodies[1], second)) * speed;
+        let masses = [mass(bodies[0], first), mass(bodies[1], second)];
+        let (light, heavy) = (masses[0].min(masses[1]), masses[0].max(masses[1]));
+        // Both ends take the impulse: by the reduced mass it stops them on each other.
+        let reduced = if light.is_finite() { light / (1.0 + light / heavy) } else { light };
+        let stopping = reduced * speed;
         let drag = (self.friction * force * time_step).min(stopping);
         push - slip * (drag / speed)
     }

@@ -226,8 +226,8 @@ impl Object {
         }
     }
 
-    /// Makes an earlier snapshot one of this object; allocates only if their geometries are of
-    /// different kinds or sizes.
+    /// Makes an earlier snapshot one of this object. Geometries allocate only if they are of different kinds or sizes,
+    /// behaviours if they show something of their own, as tools do.
     pub fn snapshot_into(&self, snapshot: &mut Self) {
         snapshot.id = self.id;
         snapshot.group = self.group;

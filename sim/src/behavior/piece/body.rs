@@ -38,7 +38,7 @@ impl Body {
         body
     }
 
-    /// Takes mass and inertia from the densities as they are now; velocities stay.
+    /// Takes mass and inertia from the densities as they are now; velocities stay, as long as there is bone.
     pub(super) fn weigh(&mut self, volume: &Volume) {
         let sums = Sums::new(volume);
         let spacing = volume.spacing().as_dvec3();
@@ -47,6 +47,7 @@ impl Body {
         self.mass = mass as f32;
         if sums.whole == 0 {
             self.inverse_inertia = Mat3::ZERO;
+            (self.velocity, self.angular_momentum) = (Vec3::ZERO, Vec3::ZERO);
             return;
         }
         // In voxels, from the middle of the first one; the second moments are those about the middle.

@@ -29,8 +29,8 @@ pub struct Scrape {
 
 /// Cuts where a blade has been in a frame.
 ///
-/// Frame after frame a tool's cuts go on from each other; one whose blade was out of the tissue begins a
-/// new one. Where the blade lies now counts, so a tool posts this in every frame in which its blade may
+/// Frame after frame a tool's cuts go on from each other; one whose blade was out of the tissue, or that a frame went by
+/// without, begins a new one. Where the blade lies now counts, so a tool posts this in every frame in which its blade may
 /// be in the tissue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cut {

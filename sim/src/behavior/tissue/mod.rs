@@ -58,12 +58,21 @@ pub struct Tissue {
     anchors: Anchors,
     slits: Vec<[u32; 2]>,
     /// Where the tools' cuts go on from.
-    fronts: Vec<(ObjectId, u32)>,
+    fronts: Vec<Front>,
     /// The shortest edge that cutting leaves, in metres.
     shortest: f32,
     /// Of what never changes but by a cut.
     digest: u64,
     nodes: Nodes,
+}
+
+/// Where a tool's cut goes on from.
+#[derive(Clone, Copy, Debug)]
+struct Front {
+    by: ObjectId,
+    node: u32,
+    /// Whether the tool has cut since the last update. One that has not has taken its blade out.
+    is_cutting: bool,
 }
 
 impl Tissue {
@@ -177,7 +186,7 @@ impl Tissue {
     /// The node at which a tool's cut goes on, if its blade is in the tissue.
     #[must_use]
     pub fn cut_front(&self, by: ObjectId) -> Option<u32> {
-        self.fronts.iter().find(|front| front.0 == by).map(|front| front.1)
+        self.fronts.iter().find(|front| front.by == by).map(|front| front.node)
     }
 
     /// A mesh of this topology, with masses from the rest shape, and the springs for it.
@@ -208,6 +217,9 @@ impl Tissue {
         if !self.fits(mesh) {
             return;
         }
+        if let Some(front) = self.fronts.iter_mut().find(|front| front.by == by) {
+            front.is_cutting = true;
+        }
         let places = self.rest.iter().zip(mesh.positions.iter()).zip(mesh.velocities.iter());
         let node = |((&rest, position), velocity)| CutNode { rest, position, velocity };
         let mut surface = CutSurface {
@@ -224,8 +236,8 @@ impl Tissue {
             *mesh = new;
             *self = tissue;
         }
-        self.fronts.retain(|front| front.0 != by);
-        self.fronts.extend(front.map(|front| (by, front)));
+        self.fronts.retain(|front| front.by != by);
+        self.fronts.extend(front.map(|node| Front { by, node, is_cutting: true }));
     }
 
     /// This tissue with another surface, and its mesh.
@@ -256,7 +268,8 @@ impl Tissue {
         let hold = |grip: &&Grip| grip.by != ObjectId::HOST && !grip.nodes.is_empty();
         let held = self.anchors.grips.iter().filter(hold);
         let held = held.map(|grip| (grip.by, Felt { held: grip.force, cuts: false }));
-        let cut = self.fronts.iter().map(|&(by, _)| (by, Felt { held: Vec3::ZERO, cuts: true }));
+        let felt = |front: &Front| (front.by, Felt { held: Vec3::ZERO, cuts: true });
+        let cut = self.fronts.iter().map(felt);
         for (by, felt) in held.chain(cut) {
             input.post(by, Message::Custom(Box::new(felt)));
         }
@@ -274,6 +287,7 @@ impl Tissue {
 
 impl Behavior for Tissue {
     fn update(&mut self, geometry: &mut Geometry, input: &mut Input<'_>) {
+        self.fronts.retain_mut(|front| std::mem::take(&mut front.is_cutting));
         let Some(mesh) = geometry.as_mesh_mut().filter(|mesh| self.fits(mesh)) else { return };
         for contact in input.contacts() {
             let impulse = Vec3::from_array(contact.impulse);
@@ -346,9 +360,9 @@ impl Behavior for Tissue {
         hasher.write(&self.substeps.to_le_bytes());
         hasher.write(&[u8::from(self.weightless)]);
         hasher.write(&self.digest.to_le_bytes());
-        for (by, front) in &self.fronts {
+        for Front { by, node, .. } in &self.fronts {
             hasher.write(&by.0.to_le_bytes());
-            hasher.write(&front.to_le_bytes());
+            hasher.write(&node.to_le_bytes());
         }
         self.anchors.hash_state(hasher);
     }

@@ -63,7 +63,7 @@ pub struct Report {
     pub peak_force: f32,
     /// The force that 95 % of the drilling stayed below, in newtons, in steps of 0.25.
     pub force_p95: f32,
-    /// The greatest force of soft tissue on a tool, in newtons.
+    /// The greatest force of soft tissue that tools press on, in newtons; of what is there only the dura presses back.
     pub peak_tissue_force: f32,
     /// The greatest force of the dura on a tool, in newtons.
     pub peak_dural_force: f32,

@@ -33,7 +33,7 @@ const BEYOND: f32 = 0.002;
 const LEANING: f32 = 0.03;
 /// How long it leans at most, in frames; usually 15 s.
 const LEANING_FRAMES: usize = 900;
-/// How far from the head a hand rests, in metres; usually 40 mm.
+/// From how far off the head instruments are led to it, in metres; usually 40 mm. Hands rest twice as far off.
 const AWAY: f32 = 0.04;
 /// How high the bone flap is lifted, in metres; usually 40 mm.
 const LIFTED: f32 = 0.04;
