@@ -32,7 +32,7 @@ impl Pending {
     /// arrived.
     #[inline]
     pub(crate) fn arrive(&self) -> bool {
-        let before = self.0.fetch_sub(word(1, 0), site::COUNTDOWN_ARRIVE);
+        let before = self.0.fetch_sub(word(1, 0), site::PENDING_ARRIVE);
         before >> INDEX_BITS == 1
     }
 
@@ -68,7 +68,7 @@ impl Pending {
     /// arrive anew.
     #[inline]
     pub(crate) fn arm(&self, arrivals: u32) {
-        self.0.store(word(arrivals as usize, EMPTY), site::COUNTDOWN_ARM);
+        self.0.store(word(arrivals as usize, EMPTY), site::PENDING_ARM);
     }
 }
 

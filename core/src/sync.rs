@@ -147,6 +147,10 @@ sites! {
     COUNTDOWN_ARRIVE = AcqRel;
     /// Relaxed: nobody arrives before the re-armed counter was published by something else.
     COUNTDOWN_ARM = Relaxed;
+    /// Acquire and Release: as `COUNTDOWN_ARRIVE`, of a unit's pending work.
+    PENDING_ARRIVE = AcqRel;
+    /// Relaxed: as `COUNTDOWN_ARM`.
+    PENDING_ARM = Relaxed;
     /// Release: an arriver's object is read by those after it.
     ARRIVALS_PUBLISH = Release;
     /// Acquire: pairs with `ARRIVALS_PUBLISH`.

@@ -55,6 +55,14 @@ pub enum Bug {
     LeaverSwallowsCall,
     /// A token that is given away stays.
     TokenDoubled,
+    /// Whoever puts the shared renderer back does not look for renderings once more.
+    NotLookedAgain,
+    /// A worker that leaves takes the shared renderer along.
+    LeavesWithRenderer,
+    /// A worker sleeps while it has the shared renderer.
+    SleepsWithRenderer,
+    /// A call to render rings the holders' bell, though the renderer is shared and nobody holds a token.
+    RenderingCallsHolders,
 }
 
 /// A model.
@@ -84,6 +92,9 @@ pub struct Config {
     pub tokens: u8,
     /// How often a token may be given away.
     pub handovers: u8,
+    /// Whether the one token is the renderer that is left to all workers: they take it, and put it back,
+    /// themselves.
+    pub shared: bool,
     /// Whether a worker may keep what it sets free, and idle ones sleep until they are woken. Without,
     /// everything is queued, and whoever is idle looks again and again.
     pub sleep: bool,
@@ -111,6 +122,7 @@ impl Config {
             departures: 0,
             tokens: 1,
             handovers: 0,
+            shared: false,
             sleep: false,
             bug: None,
         }
@@ -118,6 +130,11 @@ impl Config {
 
     pub(crate) fn has(&self, bug: Bug) -> bool {
         self.bug == Some(bug)
+    }
+
+    /// Whether holders alone are called for renderings.
+    pub(crate) fn renderings_call_holders(&self) -> bool {
+        !self.shared || self.has(Bug::RenderingCallsHolders)
     }
 
     /// Whether `unit` bypasses the broad phase: under modelled interactions whoever has none does.

@@ -8,6 +8,7 @@
 
 pub mod config;
 pub mod model;
+mod renderer;
 pub mod replay;
 mod stages;
 pub mod state;

@@ -3,7 +3,7 @@
 use stateright::{Model, Property};
 
 use crate::config::{Bug, Config};
-use crate::state::{At, Rule, State};
+use crate::state::{At, Rule, State, Worker};
 use crate::step::{Act, Step};
 use crate::waiting::Call;
 use crate::work::Work;
@@ -26,7 +26,8 @@ impl Protocol {
             At::Gone => {}
             At::Outside if state.finished(config) => {}
             At::Outside => may(Act::Join),
-            At::Awake => self.awake(state, worker, &mut may),
+            At::Awake => self.awake(state, me, &mut may),
+            At::GoingOn => self.next_work(state, me, &mut may),
             At::Entering(unit) => {
                 let mut due = state.due(config, unit).peekable();
                 if due.peek().is_none() {
@@ -48,6 +49,7 @@ impl Protocol {
             At::Swapping => may(Act::Call { carry: false }),
             At::Opening(..)
             | At::Interacted(_)
+            | At::Passing { .. }
             | At::Advancing(_)
             | At::Rendered(_)
             | At::Reentering(_) => carries.iter().for_each(|&carry| may(Act::Go { carry })),
@@ -57,33 +59,59 @@ impl Protocol {
         }
     }
 
-    fn awake(&self, state: &State, worker: u8, may: &mut impl FnMut(Act)) {
-        let config = &self.0;
-        let me = &state.workers[worker as usize];
-        if state.finished(config) {
+    fn awake(&self, state: &State, me: &Worker, may: &mut impl FnMut(Act)) {
+        if state.finished(&self.0) {
             return;
         }
+        self.by_host(state, me, may);
+        if self.turns(state, me) {
+            may(Act::Turn);
+        } else {
+            self.next_work(state, me, may);
+        }
+    }
+
+    /// Any work that it carries or sees, or else it will sleep.
+    fn next_work(&self, state: &State, me: &Worker, may: &mut impl FnMut(Act)) {
+        let config = &self.0;
         let blind = config.has(Bug::RenderedAhead) && me.holds;
-        let seen = state.queue.iter().filter(|work| blind && matches!(work, Work::Render(_)));
+        let seen = state.queue.iter().filter(|work| blind && work.is_rendering());
         let mut work = me.carried;
         state.visible(me.holds).chain(seen).for_each(|visible| _ = work.put(visible));
         work.iter().for_each(|work| may(Act::Take(work)));
+        let awaits = config.sleep || me.at == At::GoingOn;
+        if awaits && work.is_empty() && !me.offers {
+            may(Act::Go { carry: false });
+        }
+    }
+
+    /// What the host may do to a worker between two steps, and what others' hunger may.
+    fn by_host(&self, state: &State, me: &Worker, may: &mut impl FnMut(Act)) {
+        let config = &self.0;
         let others = state.workers.iter().filter(|worker| worker.is_present()).count() - 1;
-        if me.holds && state.handovers > 0 && others > 0 {
+        if !config.shared && me.holds && state.handovers > 0 && others > 0 {
             may(Act::Release);
         }
-        if !me.holds && state.tokens > 0 {
+        if !config.shared && !me.holds && state.tokens > 0 {
             may(Act::Hold);
         }
         if !me.carried.is_empty() && config.sleep {
             may(Act::Share);
         }
-        if state.departures > 0 && others > 0 && !me.holds && !me.offers {
+        // Somebody stays: whoever holds a token, or else anyone.
+        let stays = |worker: &&Worker| worker.is_present() && !worker.is_leaving();
+        let others = state.workers.iter().filter(stays).count() - 1;
+        if state.departures > 0 && others > 0 && !me.is_holder(config) && !me.offers {
             may(Act::Leave);
         }
-        if config.sleep && work.is_empty() && !me.offers {
-            may(Act::Go { carry: false });
-        }
+    }
+
+    /// Whether a worker, before anything else, takes the shared renderer, for there is something to render, or
+    /// puts it back.
+    pub(crate) fn turns(&self, state: &State, me: &Worker) -> bool {
+        let carries = me.carried.iter().any(Work::is_rendering);
+        let renders = carries || state.rendering_is_visible();
+        self.0.shared && if me.holds { !renders } else { renders && state.tokens > 0 }
     }
 
     fn tests(&self, pair: u8, may: &mut impl FnMut(Act)) {
@@ -99,12 +127,13 @@ impl Protocol {
         let call = Call::of(&self.0, state, worker as usize);
         let counted = |holders: bool| {
             let workers = state.workers.iter().enumerate();
-            let of_bell =
-                workers.filter(|(_, worker)| worker.is_counted_asleep() && worker.holds == holders);
+            let of_bell = workers.filter(|(_, worker)| {
+                worker.is_counted_asleep() && worker.is_holder(&self.0) == holders
+            });
             of_bell.fold(0_u8, |bits, (number, _)| bits | 1 << number)
         };
         let [others, holders] =
-            [false, true].map(|holders| (counted(holders), call.woken(state, holders)));
+            [false, true].map(|holders| (counted(holders), call.woken(&self.0, state, holders)));
         let all = others.0 | holders.0;
         for woken in (0..=all).filter(|woken| woken & !all == 0) {
             let fits = |(bell, count): (u8, usize)| (woken & bell).count_ones() as usize == count;
@@ -140,6 +169,8 @@ pub mod property {
     pub const TOKEN: &str = "6 token: as many as there are, and none renders without";
     /// Invariant 7.
     pub const PROGRESS: &str = "7 progress: nobody is stuck while frames are left";
+    /// Of the shared renderer: a rendering waits for nobody who is at work while another sleeps.
+    pub const WAKES: &str = "7 progress: no rendering is left to the busy while others sleep";
     /// Not a property that may fail: the model comes to its end.
     pub const FINISHES: &str = "all frames are swapped";
     /// Nor this one: two frames are in flight.
@@ -201,6 +232,9 @@ impl Model for Protocol {
             }),
             Property::always(property::PROGRESS, |model: &Self, state: &State| {
                 state.broken.is_some() || !model.is_stuck(state)
+            }),
+            Property::always(property::WAKES, |model: &Self, state: &State| {
+                state.wakes_for_rendering(&model.0)
             }),
             Property::sometimes(property::FINISHES, |model: &Self, state: &State| {
                 state.finished(&model.0)

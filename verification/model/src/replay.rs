@@ -127,6 +127,8 @@ fn only_frees(at: At) -> bool {
         At::AtGate(..)
             | At::Opening(..)
             | At::Interacted(_)
+            | At::Passing { .. }
+            | At::PuttingBack { gone: true }
             | At::Advancing(_)
             | At::Rendered(_)
             | At::Reentering(_)
@@ -137,6 +139,19 @@ fn only_frees(at: At) -> bool {
 /// Whether what comes next there is unseen, and its order may matter.
 fn is_unseen(at: At) -> bool {
     matches!(at, At::Entering(_) | At::Arriving(..) | At::Counting)
+}
+
+/// `state` after `worker` has taken the shared renderer, if it is free, or put it back. Whether it saw a
+/// rendering is not asked: an update is seen before its rendering is queued.
+fn renderer_moved(state: &State, worker: usize) -> Option<State> {
+    let mut moved = state.clone();
+    let has = &mut moved.workers[worker].holds;
+    if !*has && state.tokens == 0 {
+        return None;
+    }
+    moved.tokens = u8::from(*has);
+    *has = !*has;
+    Some(moved)
 }
 
 impl Replay {
@@ -181,6 +196,17 @@ impl Replay {
         sound.then_some(state)
     }
 
+    /// All states that an unseen step of `worker` may have led to.
+    fn after_unseen(&self, state: &State, worker: usize) -> Vec<State> {
+        let at = state.workers[worker].at;
+        if self.model.0.shared && at == At::Awake {
+            return renderer_moved(state, worker).into_iter().collect();
+        }
+        let steps = if is_unseen(at) { self.acts(state, worker as u8) } else { vec![] };
+        let unseen = steps.into_iter().filter(|(_, act)| matches!(act, Act::Go { .. }));
+        unseen.filter_map(|act| self.made(state, act)).collect()
+    }
+
     /// All states that unseen steps may have led to.
     fn possible(&self, states: Vec<State>) -> Vec<State> {
         let mut known: HashSet<State> = states.iter().cloned().collect();
@@ -189,12 +215,7 @@ impl Replay {
         while let Some(state) = all.get(next).cloned() {
             next += 1;
             for worker in 0..state.workers.len() {
-                if !is_unseen(state.workers[worker].at) {
-                    continue;
-                }
-                let steps = self.acts(&state, worker as u8);
-                let unseen = steps.into_iter().filter(|(_, act)| matches!(act, Act::Go { .. }));
-                for later in unseen.filter_map(|act| self.made(&state, act)) {
+                for later in self.after_unseen(&state, worker) {
                     if known.insert(later.clone()) {
                         all.push(later);
                     }
@@ -250,7 +271,10 @@ impl Replay {
         // Somebody may have taken its token and not have been seen to hold it yet.
         let mut state = state.clone();
         state.workers[worker as usize].offers &= act != Act::Leave;
-        let allowed = self.acts(&state, worker).contains(&(worker, act));
+        // A worker begins with what it saw, and others may have rendered that, or queued renderings, since then.
+        let turns = matches!(act, Act::Take(_)) && self.model.turns(&state, me);
+        let asked = if turns { renderer_moved(&state, worker as usize)? } else { state.clone() };
+        let allowed = self.acts(&asked, worker).contains(&(worker, act));
         allowed.then(|| self.made(&state, (worker, act))).flatten()
     }
 

@@ -74,11 +74,26 @@ impl Step<'_> {
         if !late {
             slot.pending = counted;
         }
-        if self.worker().holds && self.state.is_displayed(unit) {
+        let is_displayed = self.state.is_displayed(unit);
+        if self.config.shared && is_displayed {
+            self.take_renderer();
+        }
+        let own = is_displayed && self.worker().holds;
+        if self.config.shared {
+            self.goes_to(At::Passing { unit, own });
+        } else {
+            self.pass_on(unit, own);
+        }
+    }
+
+    /// `unit` is to be rendered, by this worker if it is its `own` rendering, and may enter its next frame.
+    fn pass_on(&mut self, unit: u8, own: bool) {
+        if own {
             self.emit(Work::Render(unit));
         } else {
             self.queue(Work::Render(unit));
         }
+        let late = self.config.has(Bug::ArmedAfterPublishing);
         let last = self.state.unit(unit).frame == self.config.frames;
         if self.config.entry == Entry::AfterUpdate && !last {
             self.goes_to(At::Advancing(unit));
@@ -184,6 +199,7 @@ impl Step<'_> {
                 self.ready(b);
                 self.end();
             }
+            At::Passing { unit, own } => self.pass_on(unit, own),
             At::Advancing(unit) if self.config.has(Bug::ArmedAfterPublishing) => {
                 self.emit(Work::Enter(unit));
                 self.goes_to(At::ArmingLate(unit));
@@ -196,6 +212,7 @@ impl Step<'_> {
             At::Rendered(unit) => self.render_counted(unit),
             At::Counting => self.count_rendered(),
             At::Reentering(unit) => self.advance(unit, Then::Enter(unit + 1)),
+            At::Taking | At::PuttingBack { .. } | At::LookingAgain => self.go_sharing(),
             _ => self.go_waiting(),
         }
     }

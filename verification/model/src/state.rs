@@ -68,6 +68,13 @@ pub enum At {
     Interacted(u8),
     /// In the callback of an update.
     Updating(u8),
+    /// Has updated the unit, and queues its rendering unless it is its own: it has the shared renderer.
+    Passing {
+        /// The unit.
+        unit: u8,
+        /// Whether the worker itself may render it.
+        own: bool,
+    },
     /// Lets the unit enter its next frame.
     Advancing(u8),
     /// Arms the unit's countdown late (a seeded bug only).
@@ -89,10 +96,28 @@ pub enum At {
         /// For good.
         gone: bool,
     },
+    /// Has seen a rendering, and the shared renderer free: takes it, if it still is.
+    Taking,
+    /// Has seen no rendering, or leaves for good: puts the shared renderer back.
+    PuttingBack {
+        /// For good.
+        gone: bool,
+    },
+    /// Has put the shared renderer back, and looks for renderings once more.
+    LookingAgain,
+    /// Has looked for renderings, and goes on with whatever work it finds.
+    GoingOn,
     /// Its step found nothing to do: it will sleep.
     Idle,
     /// Has announced that it will sleep; rung since or not.
     Announced(bool),
+    /// Has looked whether the shared renderer is free, and not yet for work.
+    Glanced {
+        /// Rung since it announced itself.
+        rung: bool,
+        /// Whether it was.
+        free: bool,
+    },
     /// Has looked again and found nothing; rung since it announced itself or not.
     Looked(bool),
     /// Asleep.
@@ -108,7 +133,7 @@ pub struct Worker {
     pub at: At,
     /// What it carries.
     pub carried: Works,
-    /// Whether it holds a token.
+    /// Whether it holds a token, or has the shared renderer.
     pub holds: bool,
     /// Whether it has laid a token down that nobody has taken yet: it neither sleeps nor leaves.
     pub offers: bool,
@@ -135,7 +160,32 @@ impl Worker {
 
     /// Whether others count it among a bell's sleepers.
     pub(crate) fn is_counted_asleep(&self) -> bool {
-        matches!(self.at, At::Announced(_) | At::Looked(_) | At::Asleep | At::Returning)
+        matches!(
+            self.at,
+            At::Announced(_) | At::Glanced { .. } | At::Looked(_) | At::Asleep | At::Returning
+        )
+    }
+
+    /// Whether it listens to the holders' bell, or else to that of all others.
+    pub(crate) fn is_holder(&self, config: &Config) -> bool {
+        self.holds && !config.shared
+    }
+
+    fn is_in_callback(&self) -> bool {
+        matches!(
+            self.at,
+            At::Entering(_)
+                | At::Arriving(..)
+                | At::Interacting(_)
+                | At::Updating(_)
+                | At::Rendering(_)
+                | At::Swapping
+        )
+    }
+
+    /// Whether it is about to leave for good.
+    pub(crate) fn is_leaving(&self) -> bool {
+        matches!(self.at, At::PuttingBack { gone: true } | At::Leaving { gone: true })
     }
 
     pub(crate) fn is_present(&self) -> bool {
@@ -164,7 +214,7 @@ pub struct State {
     pub renders: u8,
     /// The frame on display.
     pub display: u8,
-    /// Tokens that nobody holds.
+    /// Tokens that nobody holds; 1 while the shared renderer is free.
     pub tokens: u8,
     /// How many workers may still leave.
     pub departures: u8,
@@ -181,9 +231,10 @@ impl State {
         let mut queue = Works::default();
         (0..config.units).for_each(|unit| _ = queue.put(Work::Enter(unit)));
         let present = config.workers - config.late;
+        let held = if config.shared { 0 } else { config.tokens.min(present) };
         let worker = |number| {
             let at = if number < present { At::Awake } else { At::Outside };
-            Worker::new(at, number < config.tokens.min(present))
+            Worker::new(at, number < held)
         };
         Self {
             units: vec![unit; config.units as usize],
@@ -195,7 +246,7 @@ impl State {
             gate: config.units,
             renders: config.units,
             display: 0,
-            tokens: config.tokens.saturating_sub(present),
+            tokens: config.tokens - held,
             departures: config.departures,
             handovers: config.handovers,
             broken: None,
@@ -225,6 +276,11 @@ impl State {
             Work::Render(unit) => holder && self.is_displayed(unit),
             _ => true,
         })
+    }
+
+    /// Whether a rendering is queued that may be rendered now.
+    pub(crate) fn rendering_is_visible(&self) -> bool {
+        self.visible(true).any(Work::is_rendering)
     }
 
     /// Whether the frame of `unit`'s last update is on display.
@@ -266,6 +322,18 @@ impl State {
             written |= mine;
         }
         self.workers.iter().all(|worker| reads(worker) & written == 0)
+    }
+
+    /// No rendering that is anybody's is left to workers in callbacks, which may take long, while others sleep.
+    pub fn wakes_for_rendering(&self, config: &Config) -> bool {
+        let is_anybodys = config.shared && self.tokens > 0 && self.rendering_is_visible();
+        let is_asleep = |worker: &Worker| worker.at == At::Asleep;
+        !is_anybodys
+            || !self.workers.iter().any(is_asleep)
+            || self
+                .workers
+                .iter()
+                .any(|worker| worker.is_present() && !is_asleep(worker) && !worker.is_in_callback())
     }
 
     /// Invariant 6: no more tokens than there are.

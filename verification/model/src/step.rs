@@ -17,6 +17,8 @@ pub enum Act {
     Hold,
     /// The worker gives what it carries to the queues.
     Share,
+    /// It has looked for renderings: it is about to take the shared renderer, or to put it back.
+    Turn,
     /// It begins a work unit.
     Take(Work),
     /// It tests a pair, which is a candidate or not.
@@ -67,6 +69,7 @@ impl<'c> Step<'c> {
             Act::Release => step.leave(false),
             Act::Hold => step.hold(),
             Act::Share => step.share(),
+            Act::Turn => step.turn(),
             Act::Take(work) => step.take(work),
             Act::Test { pair, near, .. } => step.test(pair, near),
             Act::Call { .. } => step.call(),
@@ -118,12 +121,10 @@ impl<'c> Step<'c> {
     }
 
     pub(crate) fn count_queued(&mut self, work: Work) {
-        let most = self.config.workers;
-        let worker = self.worker();
-        let count = match work {
-            Work::Render(_) => &mut worker.renders,
-            _ => &mut worker.queued,
-        };
+        let (config, worker) = (self.config, &mut self.state.workers[self.number]);
+        let most = config.workers;
+        let calls_holders = work.is_rendering() && config.renderings_call_holders();
+        let count = if calls_holders { &mut worker.renders } else { &mut worker.queued };
         *count = (*count + 1).min(most);
     }
 

@@ -3,7 +3,7 @@
 use crate::config::{Bug, Config};
 use crate::state::{At, State, Worker};
 use crate::step::Step;
-use crate::work::{Work, Works};
+use crate::work::Works;
 
 impl Step<'_> {
     /// What is carried goes to the queues.
@@ -31,7 +31,12 @@ impl Step<'_> {
             self.worker().carried = Works::default();
         }
         self.shed();
-        self.goes_to(At::Leaving { gone });
+        let puts_back = self.config.shared && self.worker().holds;
+        self.goes_to(if puts_back && !self.config.has(Bug::LeavesWithRenderer) {
+            At::PuttingBack { gone }
+        } else {
+            At::Leaving { gone }
+        });
     }
 
     pub(crate) fn hold(&mut self) {
@@ -43,11 +48,16 @@ impl Step<'_> {
     }
 
     pub(crate) fn go_waiting(&mut self) {
+        let holds = self.worker().holds;
         let next = match self.at() {
-            At::Awake => At::Idle,
+            At::GoingOn if !self.config.sleep => At::Awake,
+            At::Awake | At::GoingOn => At::Idle,
             At::Idle => At::Announced(false),
-            At::Announced(_) if self.has_cause_to_wake() => At::Returning,
-            At::Announced(rung) => At::Looked(rung),
+            At::Announced(rung) if self.config.shared => {
+                At::Glanced { rung, free: self.state.tokens > 0 }
+            }
+            At::Announced(rung) => self.looked(rung, holds),
+            At::Glanced { rung, free } => self.looked(rung, free),
             At::Looked(true) => At::Returning,
             At::Looked(false) => At::Asleep,
             At::Returning => At::Awake,
@@ -56,23 +66,31 @@ impl Step<'_> {
         self.goes_to(next);
     }
 
-    fn has_cause_to_wake(&self) -> bool {
-        let worker = &self.state.workers[self.number];
-        !self.config.has(Bug::NoSecondLook)
-            && (self.state.visible(worker.holds).next().is_some()
-                || self.state.finished(self.config))
+    /// Has looked for work, for renderings too if it `renders`.
+    fn looked(&self, rung: bool, renders: bool) -> At {
+        let has_shared = self.config.shared && self.state.workers[self.number].holds;
+        let has_cause_to_wake = (has_shared && !self.config.has(Bug::SleepsWithRenderer))
+            || self.state.visible(renders).next().is_some()
+            || self.state.finished(self.config);
+        if has_cause_to_wake && !self.config.has(Bug::NoSecondLook) {
+            At::Returning
+        } else {
+            At::Looked(rung)
+        }
     }
 
     /// Rings the bells for what was queued, and goes on.
     pub(crate) fn ring(&mut self, woken: u8) {
         for holders in [false, true] {
-            if Call::of(self.config, &self.state, self.number).woken(&self.state, holders) == 0 {
+            let call = Call::of(self.config, &self.state, self.number);
+            if call.woken(self.config, &self.state, holders) == 0 {
                 continue;
             }
             for (number, worker) in self.state.workers.iter_mut().enumerate() {
                 worker.at = match worker.at {
-                    at if worker.holds != holders => at,
+                    at if worker.is_holder(self.config) != holders => at,
                     At::Announced(_) => At::Announced(true),
+                    At::Glanced { free, .. } => At::Glanced { rung: true, free },
                     At::Looked(_) => At::Looked(true),
                     At::Asleep if woken >> number & 1 == 1 => At::Returning,
                     at => at,
@@ -108,9 +126,9 @@ impl Call {
         let worker = &state.workers[number];
         let (mut any, mut renders) = (worker.queued as usize, worker.renders as usize);
         if matches!(worker.at, At::Leaving { .. }) && !config.has(Bug::LeaverSwallowsCall) {
-            let is_render = |work: Work| matches!(work, Work::Render(_));
-            renders += usize::from(state.visible(true).any(is_render));
-            any += usize::from(state.visible(true).any(|work| !is_render(work)));
+            let called = if config.renderings_call_holders() { &mut renders } else { &mut any };
+            *called += usize::from(state.rendering_is_visible());
+            any += usize::from(state.visible(false).next().is_some());
         }
         if config.has(Bug::WrongBell) {
             (any, renders) = (any + renders, 0);
@@ -120,9 +138,11 @@ impl Call {
 
     /// How many of a bell's sleepers this wakes: holders only for what the others are too few for,
     /// or to render.
-    pub(crate) fn woken(self, state: &State, holders: bool) -> usize {
+    pub(crate) fn woken(self, config: &Config, state: &State, holders: bool) -> usize {
         let sleepers = |holders: bool| {
-            let asleep = |worker: &&Worker| worker.is_counted_asleep() && worker.holds == holders;
+            let asleep = |worker: &&Worker| {
+                worker.is_counted_asleep() && worker.is_holder(config) == holders
+            };
             state.workers.iter().filter(asleep).count()
         };
         let others = sleepers(false).min(self.any);

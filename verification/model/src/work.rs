@@ -21,6 +21,10 @@ pub const MOST_UNITS: usize = 8;
 pub const MOST_PAIRS: usize = 36;
 
 impl Work {
+    pub(crate) fn is_rendering(self) -> bool {
+        matches!(self, Self::Render(_))
+    }
+
     fn bit(self) -> u64 {
         let most = MOST_UNITS as u8;
         1 << match self {

@@ -18,10 +18,12 @@ fn setups() -> impl Strategy<Value = (Setup, u32)> {
     let broad_phase = prop_oneof![Just(BroadPhase::Spatial), Just(BroadPhase::Pairwise)];
     let entry =
         prop_oneof![Just(Entry::AfterUpdate), Just(Entry::AfterRender), Just(Entry::AfterSwap)];
-    let sizes = (1..=7_u32, 1..=5_u32, 1..=2_u32, 1..=4_u32);
+    // The second way is one token, shared.
+    let tokens = prop_oneof![(1..=2_u32, Just(false)), Just((1, true))];
+    let sizes = (1..=7_u32, 1..=5_u32, tokens, 1..=4_u32);
     let chances = (any::<u64>(), 0..100_u64, prop_oneof![Just(0), 0..128_u32]);
     (broad_phase, entry, sizes, chances).prop_map(|(broad_phase, entry, sizes, chances)| {
-        let (units, frames, tokens, workers) = sizes;
+        let (units, frames, (tokens, shared), workers) = sizes;
         let (seed, near_percent, solitary) = chances;
         let setup = Setup {
             units,
@@ -29,6 +31,7 @@ fn setups() -> impl Strategy<Value = (Setup, u32)> {
             broad_phase,
             entry,
             tokens,
+            shared,
             homes: 2,
             seed,
             near_percent,

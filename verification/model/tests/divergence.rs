@@ -14,11 +14,21 @@ use dut::pipeline::BroadPhase;
 use record::{Park, Setup, judge, run};
 
 /// Four units of which most pairs are near, three frames, three workers.
-fn real(broad_phase: BroadPhase, entry: Entry) -> (Config, Vec<Seen>) {
+fn real(broad_phase: BroadPhase, entry: Entry, shared: bool) -> (Config, Vec<Seen>) {
     let (tokens, seed, near_percent, solitary) = (1, 5, 60, 0);
     let (units, frames) = (4, 3);
-    let setup =
-        Setup { units, frames, broad_phase, entry, tokens, homes: 2, seed, near_percent, solitary };
+    let setup = Setup {
+        units,
+        frames,
+        broad_phase,
+        entry,
+        tokens,
+        shared,
+        homes: 2,
+        seed,
+        near_percent,
+        solitary,
+    };
     let (record, values) = run(&setup, 3, Park::default());
     judge(&setup, &record, &values);
     replay(&setup.model(), &record).expect("unchanged, it is the model's");
@@ -34,8 +44,10 @@ fn is_step(event: Event) -> bool {
 fn refused(name: &str, change: impl Fn(&mut Vec<Seen>, usize) -> Option<()>) {
     let mut changes = 0;
     for broad_phase in [BroadPhase::Spatial, BroadPhase::Pairwise] {
-        for entry in [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap] {
-            let (config, record) = real(broad_phase, entry);
+        let entries = [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap];
+        let ways = entries.into_iter().flat_map(|entry| [(entry, false), (entry, true)]);
+        for (entry, shared) in ways {
+            let (config, record) = real(broad_phase, entry, shared);
             for at in 0..record.len() {
                 let mut changed = record.clone();
                 if !is_step(record[at].event) || change(&mut changed, at).is_none() {

@@ -14,7 +14,8 @@ use stateright::{Checker, Model};
 fn explore(config: Config) {
     let start = Instant::now();
     let name = format!(
-        "{:?} {:?}, {} workers ({} late, {} may leave), {} units, {} pairs, {} frames, sleep: {}",
+        "{:?} {:?}, {} workers ({} late, {} may leave), {} units, {} pairs, {} frames, sleep: {}, \
+         shared: {}",
         config.broad_phase,
         config.entry,
         config.workers,
@@ -23,7 +24,8 @@ fn explore(config: Config) {
         config.units,
         config.pairs.len(),
         config.frames,
-        config.sleep
+        config.sleep,
+        config.shared
     );
     let (sleep, entry) = (config.sleep, config.entry);
     let checker = Protocol(config).checker().symmetry_fn(State::representative).spawn_dfs().join();
@@ -92,6 +94,41 @@ fn two_tokens() {
     explore(Config { tokens: 2, ..small(Entry::AfterUpdate) });
 }
 
+/// The renderer is left to all workers.
+mod shared {
+    use super::*;
+
+    /// Nobody has a token that could be handed on.
+    pub(super) fn shared(config: Config) -> Config {
+        Config { shared: true, handovers: 0, ..config }
+    }
+
+    #[test]
+    fn awake() {
+        for entry in [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap] {
+            explore(shared(three(entry)));
+        }
+    }
+
+    #[test]
+    fn asleep() {
+        for entry in [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap] {
+            explore(shared(small(entry)));
+        }
+    }
+
+    #[test]
+    fn no_path_is_a_circle() {
+        assert_no_circle(shared(Config { departures: 1, ..small(Entry::AfterUpdate) }));
+    }
+
+    #[test]
+    #[ignore = "minutes, see README.md"]
+    fn no_path_is_a_circle_full() {
+        assert_no_circle(shared(Config { sleep: true, ..three(Entry::AfterUpdate) }));
+    }
+}
+
 #[test]
 fn a_solitary_unit_and_one_within_itself() {
     let config = Config { solitary: 4, ..Config::new(2, 3, &[[0, 1], [0, 0]], 3) };
@@ -126,6 +163,12 @@ mod full {
         pairwise_after_update: Pairwise AfterUpdate;
         pairwise_after_render: Pairwise AfterRender;
         pairwise_after_swap: Pairwise AfterSwap;
+    }
+
+    #[test]
+    #[ignore = "minutes, see README.md"]
+    fn shared() {
+        explore(super::shared::shared(Config { sleep: true, ..three(Entry::AfterUpdate) }));
     }
 }
 

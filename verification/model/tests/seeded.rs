@@ -45,6 +45,11 @@ fn sleeping(workers: u8) -> Config {
     Config { sleep: true, ..Config::new(workers, 2, &[[0, 1]], 2) }
 }
 
+/// The same, and the renderer is left to all workers.
+fn sharing(workers: u8) -> Config {
+    Config { shared: true, ..sleeping(workers) }
+}
+
 macro_rules! seeded {
     ($($name:ident: $bug:ident in $config:expr => $property:expr;)*) => {
         $(#[test]
@@ -73,4 +78,10 @@ seeded! {
     leaver_swallows_call: LeaverSwallowsCall in Config { departures: 2, ..sleeping(3) }
         => property::PROGRESS;
     token_doubled: TokenDoubled in Config { handovers: 1, ..awake() } => property::TOKEN;
+    not_looked_again: NotLookedAgain in sharing(2) => property::WAKES;
+    leaves_with_renderer: LeavesWithRenderer in Config { departures: 1, ..sharing(2) }
+        => property::PROGRESS;
+    sleeps_with_renderer: SleepsWithRenderer in sharing(2) => property::PROGRESS;
+    rendering_calls_holders: RenderingCallsHolders in Config { departures: 1, ..sharing(2) }
+        => property::PROGRESS;
 }

@@ -17,17 +17,28 @@ use record::{Park, Setup, judge, run};
 use shuttle::Runner;
 use shuttle::scheduler::{PctScheduler, RandomScheduler, Scheduler};
 
-/// Every way of running, with one token or two; with two there is a solitary unit, too.
+/// Every way of running, with one token, two, or a shared renderer; with two there is a solitary unit, too.
 fn setups() -> impl Iterator<Item = Setup> {
     let entries = [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap];
     let ways = [BroadPhase::Spatial, BroadPhase::Pairwise]
         .into_iter()
         .flat_map(move |broad_phase| entries.map(|entry| (broad_phase, entry)))
-        .flat_map(|way| [1, 2].map(|tokens| (way, tokens)));
-    (1..).zip(ways).map(|(seed, ((broad_phase, entry), tokens))| {
+        .flat_map(|way| [(1, false), (2, false), (1, true)].map(|tokens| (way, tokens)));
+    (1..).zip(ways).map(|(seed, ((broad_phase, entry), (tokens, shared)))| {
         let (units, frames, near_percent) = (5, 3, 40);
         let solitary = if tokens == 2 { 4 } else { 0 };
-        Setup { units, frames, broad_phase, entry, tokens, homes: 2, seed, near_percent, solitary }
+        Setup {
+            units,
+            frames,
+            broad_phase,
+            entry,
+            tokens,
+            shared,
+            homes: 2,
+            seed,
+            near_percent,
+            solitary,
+        }
     })
 }
 
@@ -59,7 +70,7 @@ fn conform<S: Scheduler + 'static>(
     }
     let (steps, seconds) = (steps.load(Ordering::Relaxed), start.elapsed().as_secs_f64());
     println!("{name}: {traces} traces, {steps} steps replayed, {seconds:.1} s");
-    assert_eq!(traces, 12 * schedules);
+    assert_eq!(traces, 18 * schedules);
     assert!(steps > 100 * traces, "next to nothing was replayed");
 }
 

@@ -24,14 +24,24 @@ use shuttle::scheduler::{PctScheduler, RandomScheduler, ReplayScheduler, Schedul
 use shuttle::{FailurePersistence, Runner};
 
 /// The ways of running among which the schedules are divided.
-const WAYS: [(BroadPhase, Entry); 4] = [
-    (BroadPhase::Spatial, Entry::AfterUpdate),
-    (BroadPhase::Pairwise, Entry::AfterUpdate),
-    (BroadPhase::Spatial, Entry::AfterRender),
-    (BroadPhase::Pairwise, Entry::AfterSwap),
+const WAYS: [(BroadPhase, Entry, Renderer); 5] = [
+    (BroadPhase::Spatial, Entry::AfterUpdate, Renderer::Bound),
+    (BroadPhase::Spatial, Entry::AfterUpdate, Renderer::Shared),
+    (BroadPhase::Pairwise, Entry::AfterUpdate, Renderer::Bound),
+    (BroadPhase::Spatial, Entry::AfterRender, Renderer::Bound),
+    (BroadPhase::Pairwise, Entry::AfterSwap, Renderer::Shared),
 ];
 
-fn setup((broad_phase, entry): (BroadPhase, Entry)) -> Setup {
+/// Whose the renderer is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Renderer {
+    /// A token's.
+    Bound,
+    /// Left to all workers.
+    Shared,
+}
+
+fn setup((broad_phase, entry, renderer): (BroadPhase, Entry, Renderer)) -> Setup {
     let (tokens, seed, near_percent, solitary) = (1, 7, 15, 0);
     Setup {
         units: 12,
@@ -39,6 +49,7 @@ fn setup((broad_phase, entry): (BroadPhase, Entry)) -> Setup {
         broad_phase,
         entry,
         tokens,
+        shared: renderer == Renderer::Shared,
         homes: 2,
         seed,
         near_percent,
@@ -79,24 +90,24 @@ fn pct(schedules: usize) {
 
 #[test]
 fn random_schedules() {
-    random(500);
+    random(400);
 }
 
 #[test]
 fn pct_schedules() {
-    pct(500);
+    pct(400);
 }
 
 #[test]
 #[ignore = "minutes, see README.md"]
 fn random_schedules_full() {
-    random(12_500);
+    random(10_000);
 }
 
 #[test]
 #[ignore = "minutes, see README.md"]
 fn pct_schedules_full() {
-    pct(12_500);
+    pct(10_000);
 }
 
 /// The library's accesses are points at which shuttle may switch.

@@ -25,6 +25,7 @@ fn suspects(name: &str) -> &'static [Model] {
         "TOKEN" | "STATIC" => token::ALL,
         "SHARED" => shared::ALL,
         "DISPLAY" => pipeline::ALL,
+        "PENDING" => pipeline::SEVERAL_INTERACTIONS,
         _ => panic!("no model is assigned to {name}"),
     }
 }

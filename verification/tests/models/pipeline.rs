@@ -26,9 +26,12 @@ pub(crate) const ALL: &[Model] = &[
     ("pipeline::solitary_unit", solitary_unit),
     ("pipeline::letters", letters),
     ("pipeline::errors_do_no_harm", errors_do_no_harm),
-    ("pipeline::three_pairs", three_pairs),
+    SEVERAL_INTERACTIONS[0],
     ("pipeline::finished_shows_all", finished_shows_all),
 ];
+
+/// Units that wait for more than one interaction, which two workers may end.
+pub(crate) const SEVERAL_INTERACTIONS: &[Model] = &[("pipeline::three_pairs", three_pairs)];
 
 /// Who did anything in the window that was explored, and how far frame 1 overlapped frame 0.
 type Outcome = ([bool; 2], Overlap);

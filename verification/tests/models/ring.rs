@@ -21,6 +21,10 @@ pub(crate) trait Queue: 'static {
     fn push(&self, index: u32);
     /// Takes the oldest.
     fn pop(&self) -> Option<u32>;
+    /// Whether it looks empty; a queue that has no such hint never does.
+    fn looks_empty(&self) -> bool {
+        false
+    }
 }
 
 impl Queue for IndexRing<'static> {
@@ -33,12 +37,11 @@ impl Queue for IndexRing<'static> {
     }
 
     fn pop(&self) -> Option<u32> {
-        let popped = IndexRing::pop(self);
-        // The hint may be stale but must agree with one thread's own view.
-        if popped.is_none() {
-            std::hint::black_box(self.looks_empty());
-        }
-        popped
+        IndexRing::pop(self)
+    }
+
+    fn looks_empty(&self) -> bool {
+        IndexRing::looks_empty(self)
     }
 }
 
@@ -121,6 +124,8 @@ pub(crate) fn earlier_push_is_found<Q: Queue>() {
             if !pushed.load(Ordering::Acquire) {
                 return None;
             }
+            let looks_empty = queue.looks_empty();
+            assert!(!looks_empty, "a push that happened before was not seen");
             let index = queue.pop();
             assert!(index.is_some(), "a push that happened before was missed");
             index

@@ -40,8 +40,12 @@ pub(crate) fn run<W: Waiting>(setup: &Setup, workers: u32, waiting: W) -> (Vec<S
     let recorder = Recorder::default();
     let mut slots = Slots::new(setup);
     let mut pipeline = slots.pipeline(setup, waiting);
+    if setup.shared {
+        pipeline.share(Screen).map_err(drop).expect("no token is out");
+    }
+    let tokens = if setup.shared { 0 } else { setup.tokens };
     let token = |_| pipeline.token(Screen).map_err(drop).expect("a token");
-    let shop: Shop<'_> = Mutex::new((0..setup.tokens).map(token).collect());
+    let shop: Shop<'_> = Mutex::new((0..tokens).map(token).collect());
     os::scope(|scope| {
         for worker in 0..workers {
             let host = Host { setup, recorder: &recorder, worker, pause: os::let_others_run };
@@ -53,6 +57,7 @@ pub(crate) fn run<W: Waiting>(setup: &Setup, workers: u32, waiting: W) -> (Vec<S
         }
     });
     drop(shop);
+    assert_eq!(pipeline.take_back().is_some(), setup.shared);
     let values = pipeline.objects_mut().map(|body| body.value).collect();
     drop(pipeline);
     (recorder.into_record(), values)
@@ -102,8 +107,9 @@ fn stint<'p, 'a: 'p, W: Waiting>(
             tired = os::below(3) == 0;
         }
     }
-    drop(worker);
+    // Ahead of it: others may take what this worker leaves before they see that it has left.
     see(Event::Leave);
+    drop(worker);
 }
 
 fn is_empty(shop: &Shop<'_>) -> bool {

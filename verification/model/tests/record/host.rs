@@ -22,7 +22,10 @@ pub(crate) struct Setup {
     pub(crate) frames: u32,
     pub(crate) broad_phase: BroadPhase,
     pub(crate) entry: Entry,
+    /// 1 where the renderer is shared.
     pub(crate) tokens: u32,
+    /// Whether the renderer is left to all workers.
+    pub(crate) shared: bool,
     pub(crate) homes: u32,
     /// Decides which pairs are modelled, and which are near in which frame.
     pub(crate) seed: u64,
@@ -58,6 +61,7 @@ impl Setup {
                 Entry::AfterSwap => config::Entry::AfterSwap,
             },
             tokens: self.tokens as u8,
+            shared: self.shared,
             solitary: solitary.fold(0, |bits, unit| bits | 1 << unit),
             ..Config::new(1, self.units as u8, &pairs, self.frames as u8)
         }
