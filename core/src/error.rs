@@ -44,9 +44,10 @@ pub struct TableFull {
     pub table: Table,
     /// What it holds.
     pub capacity: usize,
-    /// What it would have had to hold for all that was asked of it so far in this frame. The last such error
-    /// of a frame names the capacity needed, or less where smaller requests, of contacts, still found room
-    /// after it.
+    /// Of interactions and contacts: what it would have had to hold for all that was asked of it so far in this
+    /// frame. The last such error of a frame names the capacity needed, or less where smaller requests, of
+    /// contacts, still found room after it. Of letters, tokens and readers, which are given back at any time: one
+    /// more than there are.
     pub needed: usize,
 }
 

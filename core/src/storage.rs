@@ -182,8 +182,9 @@ pub(crate) unsafe fn at<T>(table: &[T], index: usize) -> &T {
     unsafe { table.get_unchecked(index) }
 }
 
-/// How many queue slots a pipeline of these sizes needs.
+/// How many queue slots a pipeline of these sizes needs; it has at least one home.
 pub const fn queue_slots(units: usize, interactions: usize, letters: usize, homes: usize) -> usize {
+    let homes = if homes == 0 { 1 } else { homes };
     let rings = 2 * (homes + 1) * slots_for(units) + slots_for(interactions) + slots_for(letters);
     rings + units
 }

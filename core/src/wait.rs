@@ -75,7 +75,7 @@ impl Bell {
 
     /// Sleeps unless `look` still finds work after the announcement.
     pub(crate) fn sleep_unless(&self, waiting: &impl Waiting, look: impl FnOnce() -> bool) {
-        self.sleepers.fetch_add(1, site::BELL_ANNOUNCE);
+        let _announced = Announced::at(self);
         let mut seen = Epoch(self.epoch.load(site::BELL_EPOCH_SEEN));
         fence(site::FENCE_SLEEP);
         if !look() {
@@ -84,7 +84,6 @@ impl Bell {
             }
             waiting.sleep(self, seen);
         }
-        self.sleepers.fetch_sub(1, site::BELL_ANNOUNCE);
     }
 
     /// Wakes up to `count` sleepers and returns how many there were to wake. The caller has
@@ -96,6 +95,22 @@ impl Bell {
             waiting.wake(self, woken);
         }
         woken
+    }
+}
+
+/// A sleeper, counted at its bell; no longer when it wakes, or its host's way of sleeping panics.
+struct Announced<'b>(&'b Bell);
+
+impl<'b> Announced<'b> {
+    fn at(bell: &'b Bell) -> Self {
+        bell.sleepers.fetch_add(1, site::BELL_ANNOUNCE);
+        Self(bell)
+    }
+}
+
+impl Drop for Announced<'_> {
+    fn drop(&mut self) {
+        self.0.sleepers.fetch_sub(1, site::BELL_ANNOUNCE);
     }
 }
 
@@ -221,6 +236,14 @@ mod tests {
             assert_eq!(bell.ring(&Spin, 3), 1, "one listens");
             false
         });
+    }
+
+    #[test]
+    fn whose_sleep_panics_is_no_sleeper() {
+        let bell = Bell::new(false);
+        let sleep = || bell.sleep_unless(&Spin, || panic!("the host's"));
+        assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(sleep)).is_err());
+        assert_eq!(bell.ring(&Spin, 1), 0);
     }
 
     #[test]

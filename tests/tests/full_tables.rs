@@ -311,6 +311,7 @@ fn memory_that_does_not_fit() {
     // Two queues of the home and two of rendering; interactions; free letters; arrivals.
     assert_eq!(needed, 4 * 8 + 32 + 4 + 5);
     assert_eq!(queue_slots(5, 20, 3, 3), needed + 2 * 2 * 8, "two for each home");
+    assert_eq!(queue_slots(5, 20, 3, 0), needed, "there is always one home");
     for queues in [0, needed - 1] {
         let few = Sizes { queues: Some(queues), ..good.clone() };
         assert_eq!(few.refused(), Some(SetupError::Table(full(Table::Queues, queues, needed))));

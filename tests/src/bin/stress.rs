@@ -20,6 +20,7 @@ use dualframe_core::unit::UnitId;
 use dualframe_core::worker::Step;
 use dualframe_tests::body::draw;
 use dualframe_tests::drive::Park;
+use dualframe_tests::watchdog::watch;
 
 /// Virtual environments.
 const CASES: u64 = 200;
@@ -185,6 +186,8 @@ impl Crowd {
 /// Four workers compute what one does.
 fn environments() -> Result<(), String> {
     for seed in 0..CASES {
+        // A worker that fails leaves the others waiting.
+        let _watched = watch(format!("seed {seed}"));
         let crowd = Crowd::of(seed);
         if crowd.run(4)? != crowd.run(1)? {
             return Err(format!("seed {seed}: four workers have other results than one"));
