@@ -18,6 +18,7 @@ use dualframe_sim::executor::ExecutorKind;
 use dualframe_sim::experiment::calibrator::Calibrator;
 use dualframe_sim::experiment::machine::Machine;
 use dualframe_sim::experiment::race::{Runner, WARM_UP};
+use dualframe_sim::experiment::statistics::Quartiles;
 use dualframe_sim::experiment::timing::{Contender, Series};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::object::Object;
@@ -74,11 +75,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn median(times: &mut [f64]) -> f64 {
-    times.sort_unstable_by(f64::total_cmp);
-    times[times.len() / 2]
-}
-
 /// Milliseconds of a frame under the token, beside those of a serial frame without drawing.
 fn token_time(gpu: Gpu, objects: usize) -> Result<(), Box<dyn Error>> {
     let frames = 40;
@@ -122,8 +118,8 @@ fn token_time(gpu: Gpu, objects: usize) -> Result<(), Box<dyn Error>> {
         painting.push(began.elapsed().as_secs_f64() * 1e3);
         painter.gpu().device.poll(PollType::wait_indefinitely())?;
     }
-    let [adding, painting, working] =
-        [adding, painting, working].map(|mut times| median(&mut times));
+    let [adding, painting, working] = [adding, painting, working]
+        .map(|times| Quartiles::of(times).map_or(f64::NAN, |all| all.median));
     let token = adding + painting;
     println!(
         "{objects} objects: under the token {token:.3} ms a frame (taking them {adding:.3}, encoding and \

@@ -9,7 +9,6 @@ use super::pull::Pull;
 use super::spring_kernel::Springs;
 use super::{Behavior, Input};
 use crate::geometry::{Geometry, Mesh, Spring};
-use crate::interaction::Contact;
 use crate::message::Message;
 
 /// Why a mass–spring behaviour cannot be built.
@@ -126,13 +125,7 @@ impl MassSpring {
     /// Begins an update: what the frame's contacts do, and whoever pulls. What is left are the springs.
     #[must_use]
     pub fn begin(&self, mesh: &mut Mesh, input: &Input<'_>) -> Springs {
-        for contact in input.contacts() {
-            let impulse = Vec3::from_array(contact.impulse);
-            match contact.node {
-                Contact::BODY => mesh.apply_body_impulse(impulse),
-                node => mesh.apply_impulse(node, impulse),
-            }
-        }
+        input.apply_contacts(mesh);
         if let Some(pull) = self.pull {
             pull.apply(mesh, input.time_step);
         }

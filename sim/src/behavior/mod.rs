@@ -26,7 +26,7 @@ use std::hash::Hasher;
 use glam::Vec3;
 
 use self::drill::{Burr, Erosions};
-use crate::geometry::Geometry;
+use crate::geometry::{Geometry, Mesh};
 use crate::interaction::{Contact, Segment};
 use crate::message::Message;
 use crate::object::ObjectId;
@@ -96,6 +96,17 @@ impl Input<'_> {
     /// What this frame's interactions did to the object, ordered by the other object's number.
     pub fn contacts(&self) -> impl Iterator<Item = Contact> + '_ {
         self.received.iter().flat_map(|segment| segment.contacts())
+    }
+
+    /// Gives a deformable surface the impulses of [`Input::contacts`], at the node that each is at or as a whole.
+    pub(super) fn apply_contacts(&self, mesh: &mut Mesh) {
+        for contact in self.contacts() {
+            let impulse = Vec3::from_array(contact.impulse);
+            match contact.node {
+                Contact::BODY => mesh.apply_body_impulse(impulse),
+                node => mesh.apply_impulse(node, impulse),
+            }
+        }
     }
 
     /// Sends a message to another object, which processes it before its update of the next frame. A

@@ -8,7 +8,7 @@ use crate::simd::Arithmetic;
 
 /// The least squared length of a spring, m², which keeps a spring without length from dividing by 0.
 /// It is far below the rounding error of any other.
-const LEAST_SQUARE: f32 = 1e-30;
+pub(super) const LEAST_SQUARE: f32 = 1e-30;
 
 /// How a spring pulls its first end, in newtons per metre of the way to its second end.
 pub(super) trait Law<A: Arithmetic>: Copy {

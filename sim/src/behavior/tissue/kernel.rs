@@ -10,14 +10,11 @@
 //! Every number is the result of the same IEEE 754 operations in the same order, whatever the
 //! instructions.
 
+use super::super::spring_law::LEAST_SQUARE;
 use super::anchors::Anchor;
 use super::springs::{Block, WIDTH};
 use crate::geometry::{Mesh, Vectors};
 use crate::simd::{Isa, Kernel, Quad};
-
-/// The least squared length of a spring, m², which keeps a spring without length from dividing by 0.
-/// It is far below the rounding error of any other.
-const LEAST_SQUARE: f32 = 1e-30;
 
 /// A body's nodes, and after them one that nothing moves.
 #[derive(Clone, Debug, Default)]

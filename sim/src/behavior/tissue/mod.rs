@@ -19,7 +19,6 @@ use self::material::check;
 use self::springs::Springs;
 use super::{Behavior, Felt, Input};
 use crate::geometry::{CutNode, CutSurface, Geometry, Mesh, Sweep, Topology, Vectors, edges};
-use crate::interaction::Contact;
 use crate::message::Message;
 use crate::object::{Object, ObjectId};
 
@@ -289,13 +288,7 @@ impl Behavior for Tissue {
     fn update(&mut self, geometry: &mut Geometry, input: &mut Input<'_>) {
         self.fronts.retain_mut(|front| std::mem::take(&mut front.is_cutting));
         let Some(mesh) = geometry.as_mesh_mut().filter(|mesh| self.fits(mesh)) else { return };
-        for contact in input.contacts() {
-            let impulse = Vec3::from_array(contact.impulse);
-            match contact.node {
-                Contact::BODY => mesh.apply_body_impulse(impulse),
-                node => mesh.apply_impulse(node, impulse),
-            }
-        }
+        input.apply_contacts(mesh);
         let time = input.time_step / self.substeps as f32;
         self.fit(time, mesh);
         self.anchors.begin(mesh.inverse_masses(), time, self.substeps);
