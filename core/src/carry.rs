@@ -170,24 +170,27 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         None
     }
 
-    /// Has the shared renderer while there is something to render, and no longer.
+    /// Takes the shared renderer if there is something to render, and else has it no longer.
     #[inline]
     pub(crate) fn share_renderer(&mut self) {
-        if !self.pipeline.shared.is_offered() {
-            return;
+        if self.pipeline.shared.is_offered()
+            && (self.has_rendering()
+                || self.pipeline.render_visible()
+                || self.puts_renderer_back_and_sees())
+        {
+            self.takes_renderer();
         }
-        match (self.has_rendering() || self.pipeline.render_visible(), self.renders_shared) {
-            (true, false) => _ = self.takes_renderer(),
-            (false, true) => {
-                self.put_renderer_back();
-                // Whoever found it taken meanwhile may sleep before this worker's next step.
-                fence(site::FENCE_PUT_BACK);
-                if !seeded!(NotLookedAgain) && self.pipeline.render_visible() {
-                    self.takes_renderer();
-                }
-            }
-            _ => {}
+    }
+
+    /// Puts the shared renderer back, if this worker has it, and says whether there is something to render all the
+    /// same: whoever found it taken meanwhile may sleep before this worker's next step.
+    pub(crate) fn puts_renderer_back_and_sees(&mut self) -> bool {
+        if !self.renders_shared {
+            return false;
         }
+        self.put_renderer_back();
+        fence(site::FENCE_PUT_BACK);
+        !seeded!(NotLookedAgain) && self.pipeline.render_visible()
     }
 
     fn put_renderer_back(&mut self) {

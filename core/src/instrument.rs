@@ -94,6 +94,9 @@ faults! {
     SleepsWithRenderer;
     /// Lost wake-up: who puts the shared renderer back does not look whether a rendering was queued meanwhile.
     NotLookedAgain;
+    /// Lost wake-up: who took the shared renderer, and finds that others have rendered all, goes on to other work with
+    /// it.
+    GoesOnWithRenderer;
     /// Lost wake-up: who queues a rendering, or leaves one behind, calls holders, where anyone could do it.
     RenderingCallsHolders;
     /// The gate is armed again after the frame's updates were let go.

@@ -147,6 +147,14 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         {
             return Some(work);
         }
+        // All that was seen is rendered, by somebody else. No rendering is to wait for what this worker does instead,
+        // and one that came meanwhile is for its next step.
+        if !self.carry.has_rendering()
+            && !seeded!(GoesOnWithRenderer)
+            && self.carry.puts_renderer_back_and_sees()
+        {
+            return None;
+        }
         if let Some(work) = self.carry.take() {
             return Some(work);
         }

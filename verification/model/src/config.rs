@@ -57,10 +57,10 @@ pub enum Bug {
     TokenDoubled,
     /// Whoever puts the shared renderer back does not look for renderings once more.
     NotLookedAgain,
+    /// Whoever took the shared renderer, and finds that all is rendered, goes on to other work with it.
+    GoesOnWithRenderer,
     /// A worker that leaves takes the shared renderer along.
     LeavesWithRenderer,
-    /// A worker sleeps while it has the shared renderer.
-    SleepsWithRenderer,
     /// A call to render rings the holders' bell, though the renderer is shared and nobody holds a token.
     RenderingCallsHolders,
 }

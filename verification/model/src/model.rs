@@ -1,5 +1,7 @@
 //! The protocol as a model that `stateright` explores.
 
+use std::collections::BTreeSet;
+
 use stateright::{Model, Property};
 
 use crate::config::{Bug, Config};
@@ -60,25 +62,28 @@ impl Protocol {
     }
 
     fn awake(&self, state: &State, me: &Worker, may: &mut impl FnMut(Act)) {
-        if state.finished(&self.0) {
+        let config = &self.0;
+        if state.finished(config) {
             return;
         }
         self.by_host(state, me, may);
-        if self.turns(state, me) {
-            may(Act::Turn);
-        } else {
+        if !config.shared {
             self.next_work(state, me, may);
+        } else if config.sleep || me.holds || state.work(me, state.tokens > 0).next().is_some() {
+            may(Act::Turn);
         }
     }
 
-    /// Any work that it carries or sees, or else it will sleep.
+    /// Any work that it carries or sees, a rendering first if the renderer is shared and it has it; or else it puts
+    /// that back, or will sleep.
     fn next_work(&self, state: &State, me: &Worker, may: &mut impl FnMut(Act)) {
         let config = &self.0;
         let blind = config.has(Bug::RenderedAhead) && me.holds;
         let seen = state.queue.iter().filter(|work| blind && work.is_rendering());
-        let mut work = me.carried;
-        state.visible(me.holds).chain(seen).for_each(|visible| _ = work.put(visible));
-        work.iter().for_each(|work| may(Act::Take(work)));
+        let renders = config.shared && me.holds && !config.has(Bug::GoesOnWithRenderer);
+        let all = state.work(me, me.holds).chain(seen);
+        let work: BTreeSet<Work> = all.filter(|work| !renders || work.is_rendering()).collect();
+        work.iter().for_each(|&work| may(Act::Take(work)));
         let awaits = config.sleep || me.at == At::GoingOn;
         if awaits && work.is_empty() && !me.offers {
             may(Act::Go { carry: false });
@@ -88,7 +93,9 @@ impl Protocol {
     /// What the host may do to a worker between two steps, and what others' hunger may.
     fn by_host(&self, state: &State, me: &Worker, may: &mut impl FnMut(Act)) {
         let config = &self.0;
-        let others = state.workers.iter().filter(|worker| worker.is_present()).count() - 1;
+        // Somebody stays: whoever holds a token, or else anyone.
+        let stays = |worker: &&Worker| worker.is_present() && !worker.is_leaving();
+        let others = state.workers.iter().filter(stays).count() - 1;
         if !config.shared && me.holds && state.handovers > 0 && others > 0 {
             may(Act::Release);
         }
@@ -98,20 +105,9 @@ impl Protocol {
         if !me.carried.is_empty() && config.sleep {
             may(Act::Share);
         }
-        // Somebody stays: whoever holds a token, or else anyone.
-        let stays = |worker: &&Worker| worker.is_present() && !worker.is_leaving();
-        let others = state.workers.iter().filter(stays).count() - 1;
         if state.departures > 0 && others > 0 && !me.is_holder(config) && !me.offers {
             may(Act::Leave);
         }
-    }
-
-    /// Whether a worker, before anything else, takes the shared renderer, for there is something to render, or
-    /// puts it back.
-    pub(crate) fn turns(&self, state: &State, me: &Worker) -> bool {
-        let carries = me.carried.iter().any(Work::is_rendering);
-        let renders = carries || state.rendering_is_visible();
-        self.0.shared && if me.holds { !renders } else { renders && state.tokens > 0 }
     }
 
     fn tests(&self, pair: u8, may: &mut impl FnMut(Act)) {
@@ -169,8 +165,8 @@ pub mod property {
     pub const TOKEN: &str = "6 token: as many as there are, and none renders without";
     /// Invariant 7.
     pub const PROGRESS: &str = "7 progress: nobody is stuck while frames are left";
-    /// Of the shared renderer: a rendering waits for nobody who is at work while another sleeps.
-    pub const WAKES: &str = "7 progress: no rendering is left to the busy while others sleep";
+    /// Of the shared renderer: a rendering waits for nobody who does anything else while another sleeps.
+    pub const WAKES: &str = "7 progress: no rendering waits for other work while somebody sleeps";
     /// Not a property that may fail: the model comes to its end.
     pub const FINISHES: &str = "all frames are swapped";
     /// Nor this one: two frames are in flight.

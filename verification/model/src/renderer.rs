@@ -3,6 +3,7 @@
 use crate::config::Bug;
 use crate::state::At;
 use crate::step::Step;
+use crate::work::Work;
 
 impl Step<'_> {
     /// Takes the shared renderer, unless another worker has it.
@@ -13,10 +14,15 @@ impl Step<'_> {
         }
     }
 
-    /// Has looked for renderings between two steps.
+    /// Looks for renderings between two steps.
     pub(crate) fn turn(&mut self) {
-        let holds = self.worker().holds;
-        self.goes_to(if holds { At::PuttingBack { gone: false } } else { At::Taking });
+        let me = &self.state.workers[self.number];
+        let renders = self.state.work(me, true).any(Work::is_rendering);
+        self.goes_to(match (me.holds, renders) {
+            (true, false) => At::PuttingBack { gone: false },
+            (false, true) => At::Taking,
+            _ => At::GoingOn,
+        });
     }
 
     pub(crate) fn go_sharing(&mut self) {
@@ -25,6 +31,7 @@ impl Step<'_> {
                 self.take_renderer();
                 self.goes_to(At::GoingOn);
             }
+            At::GoingOn => self.goes_to(At::PuttingBack { gone: false }),
             At::PuttingBack { gone } => {
                 self.state.tokens += 1;
                 self.worker().holds = false;
@@ -32,7 +39,7 @@ impl Step<'_> {
             }
             At::LookingAgain => {
                 let looks = !self.config.has(Bug::NotLookedAgain);
-                let sees = looks && self.state.rendering_is_visible() && self.state.tokens > 0;
+                let sees = looks && self.state.rendering_is_visible();
                 self.goes_to(if sees { At::Taking } else { At::GoingOn });
             }
             at => unreachable!("nobody shares at {at:?}"),

@@ -12,7 +12,7 @@ use stateright::Model;
 
 use crate::config::Config;
 use crate::model::{Action, Protocol};
-use crate::state::{At, State};
+use crate::state::{At, State, Worker};
 use crate::step::Act;
 use crate::trace::{Event, Seen, Task};
 use crate::work::Work;
@@ -141,17 +141,15 @@ fn is_unseen(at: At) -> bool {
     matches!(at, At::Entering(_) | At::Arriving(..) | At::Counting)
 }
 
-/// `state` after `worker` has taken the shared renderer, if it is free, or put it back. Whether it saw a
-/// rendering is not asked: an update is seen before its rendering is queued.
-fn renderer_moved(state: &State, worker: usize) -> Option<State> {
-    let mut moved = state.clone();
-    let has = &mut moved.workers[worker].holds;
-    if !*has && state.tokens == 0 {
-        return None;
+/// Makes a worker ready to begin `work` if renderers are shared; `false` if another one renders. Who has the renderer
+/// between two steps is not seen, and does not matter: here a worker has it from a rendering's beginning to its end.
+fn turned(me: &mut Worker, free: &mut u8, work: Work) -> bool {
+    if me.at != At::Awake || (work.is_rendering() && *free == 0) {
+        return false;
     }
-    moved.tokens = u8::from(*has);
-    *has = !*has;
-    Some(moved)
+    (me.at, me.holds) = (At::GoingOn, work.is_rendering());
+    *free -= u8::from(me.holds);
+    true
 }
 
 impl Replay {
@@ -199,9 +197,6 @@ impl Replay {
     /// All states that an unseen step of `worker` may have led to.
     fn after_unseen(&self, state: &State, worker: usize) -> Vec<State> {
         let at = state.workers[worker].at;
-        if self.model.0.shared && at == At::Awake {
-            return renderer_moved(state, worker).into_iter().collect();
-        }
         let steps = if is_unseen(at) { self.acts(state, worker as u8) } else { vec![] };
         let unseen = steps.into_iter().filter(|(_, act)| matches!(act, Act::Go { .. }));
         unseen.filter_map(|act| self.made(state, act)).collect()
@@ -266,16 +261,35 @@ impl Replay {
                 }
                 Act::Call { carry: false }
             }
-            Event::End => return (me.at == At::Awake).then(|| state.clone()),
+            Event::End => {
+                let mut ended = state.clone();
+                self.put_back(&mut ended, worker);
+                return (me.at == At::Awake).then_some(ended);
+            }
         };
         // Somebody may have taken its token and not have been seen to hold it yet.
         let mut state = state.clone();
         state.workers[worker as usize].offers &= act != Act::Leave;
-        // A worker begins with what it saw, and others may have rendered that, or queued renderings, since then.
-        let turns = matches!(act, Act::Take(_)) && self.model.turns(&state, me);
-        let asked = if turns { renderer_moved(&state, worker as usize)? } else { state.clone() };
-        let allowed = self.acts(&asked, worker).contains(&(worker, act));
-        allowed.then(|| self.made(&state, (worker, act))).flatten()
+        if self.model.0.shared
+            && let Act::Take(work) = act
+            && !turned(&mut state.workers[worker as usize], &mut state.tokens, work)
+        {
+            return None;
+        }
+        let allowed = self.acts(&state, worker).contains(&(worker, act));
+        let mut after = allowed.then(|| self.made(&state, (worker, act))).flatten()?;
+        if matches!(seen.event, Event::Call(Task::Update(_), _)) {
+            self.put_back(&mut after, worker);
+        }
+        Some(after)
+    }
+
+    /// Puts back a shared renderer that `worker` may have.
+    fn put_back(&self, state: &mut State, worker: u8) {
+        let me = &mut state.workers[worker as usize];
+        if self.model.0.shared && std::mem::take(&mut me.holds) {
+            state.tokens += 1;
+        }
     }
 
     fn work(&self, task: Task) -> Option<Work> {

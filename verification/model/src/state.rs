@@ -96,7 +96,7 @@ pub enum At {
         /// For good.
         gone: bool,
     },
-    /// Has seen a rendering, and the shared renderer free: takes it, if it still is.
+    /// Has seen a rendering: takes the shared renderer, if it is free.
     Taking,
     /// Has seen no rendering, or leaves for good: puts the shared renderer back.
     PuttingBack {
@@ -105,7 +105,7 @@ pub enum At {
     },
     /// Has put the shared renderer back, and looks for renderings once more.
     LookingAgain,
-    /// Has looked for renderings, and goes on with whatever work it finds.
+    /// Has looked for renderings, and goes on: with one if it has the shared renderer, or with whatever it finds.
     GoingOn,
     /// Its step found nothing to do: it will sleep.
     Idle,
@@ -171,16 +171,9 @@ impl Worker {
         self.holds && !config.shared
     }
 
-    fn is_in_callback(&self) -> bool {
-        matches!(
-            self.at,
-            At::Entering(_)
-                | At::Arriving(..)
-                | At::Interacting(_)
-                | At::Updating(_)
-                | At::Rendering(_)
-                | At::Swapping
-        )
+    /// Whether it is in a callback other than those of the renderer.
+    fn is_at_other_work(&self) -> bool {
+        matches!(self.at, At::Entering(_) | At::Arriving(..) | At::Interacting(_) | At::Updating(_))
     }
 
     /// Whether it is about to leave for good.
@@ -278,6 +271,11 @@ impl State {
         })
     }
 
+    /// What `worker` carries, and finds in the queues.
+    pub(crate) fn work(&self, worker: &Worker, renders: bool) -> impl Iterator<Item = Work> {
+        worker.carried.iter().chain(self.visible(renders))
+    }
+
     /// Whether a rendering is queued that may be rendered now.
     pub(crate) fn rendering_is_visible(&self) -> bool {
         self.visible(true).any(Work::is_rendering)
@@ -324,16 +322,14 @@ impl State {
         self.workers.iter().all(|worker| reads(worker) & written == 0)
     }
 
-    /// No rendering that is anybody's is left to workers in callbacks, which may take long, while others sleep.
+    /// No rendering waits for a callback, which may take long, while somebody sleeps, unless for one that renders or
+    /// swaps.
     pub fn wakes_for_rendering(&self, config: &Config) -> bool {
-        let is_anybodys = config.shared && self.tokens > 0 && self.rendering_is_visible();
-        let is_asleep = |worker: &Worker| worker.at == At::Asleep;
-        !is_anybodys
-            || !self.workers.iter().any(is_asleep)
-            || self
-                .workers
-                .iter()
-                .any(|worker| worker.is_present() && !is_asleep(worker) && !worker.is_in_callback())
+        let sleeps = |worker: &Worker| worker.at == At::Asleep;
+        let comes =
+            |worker: &Worker| worker.is_present() && !sleeps(worker) && !worker.is_at_other_work();
+        let waits = config.shared && self.rendering_is_visible();
+        !waits || !self.workers.iter().any(sleeps) || self.workers.iter().any(comes)
     }
 
     /// Invariant 6: no more tokens than there are.

@@ -17,7 +17,7 @@ pub enum Act {
     Hold,
     /// The worker gives what it carries to the queues.
     Share,
-    /// It has looked for renderings: it is about to take the shared renderer, or to put it back.
+    /// It looks for renderings: it is about to take the shared renderer, or to put it back.
     Turn,
     /// It begins a work unit.
     Take(Work),

@@ -68,10 +68,8 @@ impl Step<'_> {
 
     /// Has looked for work, for renderings too if it `renders`.
     fn looked(&self, rung: bool, renders: bool) -> At {
-        let has_shared = self.config.shared && self.state.workers[self.number].holds;
-        let has_cause_to_wake = (has_shared && !self.config.has(Bug::SleepsWithRenderer))
-            || self.state.visible(renders).next().is_some()
-            || self.state.finished(self.config);
+        let has_cause_to_wake =
+            self.state.visible(renders).next().is_some() || self.state.finished(self.config);
         if has_cause_to_wake && !self.config.has(Bug::NoSecondLook) {
             At::Returning
         } else {

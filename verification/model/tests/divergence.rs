@@ -158,3 +158,29 @@ fn a_run_cut_short() {
         Some(())
     });
 }
+
+/// A rendering that begins before another worker's has ended: a shared renderer is one worker's at a time.
+#[test]
+fn a_rendering_beside_another() {
+    let step = |worker, event| Seen { worker, event };
+    let whole = |worker, task| {
+        let events = [Event::Begin(task, 0), Event::Call(task, 0), Event::End];
+        events.map(|event| step(worker, event)).to_vec()
+    };
+    let enter = |unit| [Event::Begin(Task::Enter(unit), 0), Event::End].map(|event| step(0, event));
+    let config = Config { shared: true, ..Config::new(1, 2, &[], 1) };
+    let [first, second] = [whole(0, Task::Render(0)), whole(1, Task::Render(1))];
+    let swap = step(1, Event::Swap(0));
+    let start = [
+        vec![step(0, Event::Join), step(1, Event::Join)],
+        [enter(0), enter(1)].concat(),
+        whole(0, Task::Update(0)),
+        whole(1, Task::Update(1)),
+    ];
+    let apart = [start.concat(), first.clone(), second[..2].to_vec(), vec![swap, second[2]]];
+    replay(&config, &apart.concat()).expect("one after the other");
+    let (rendered, ended) = first.split_at(2);
+    let beside = [start.concat(), rendered.to_vec(), second[..1].to_vec(), ended.to_vec()];
+    let refusal = replay(&config, &beside.concat()).expect_err("they overlap");
+    assert_eq!(refusal.seen, Some(second[0]));
+}

@@ -99,33 +99,37 @@ mod shared {
     use super::*;
 
     /// Nobody has a token that could be handed on.
-    pub(super) fn shared(config: Config) -> Config {
+    pub(super) fn sharing(config: Config) -> Config {
         Config { shared: true, handovers: 0, ..config }
     }
 
     #[test]
     fn awake() {
         for entry in [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap] {
-            explore(shared(three(entry)));
+            explore(sharing(three(entry)));
         }
     }
 
     #[test]
     fn asleep() {
         for entry in [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap] {
-            explore(shared(small(entry)));
+            explore(sharing(small(entry)));
         }
     }
 
     #[test]
     fn no_path_is_a_circle() {
-        assert_no_circle(shared(Config { departures: 1, ..small(Entry::AfterUpdate) }));
+        for entry in [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap] {
+            assert_no_circle(sharing(Config { departures: 1, ..small(entry) }));
+        }
     }
 
     #[test]
     #[ignore = "minutes, see README.md"]
     fn no_path_is_a_circle_full() {
-        assert_no_circle(shared(Config { sleep: true, ..three(Entry::AfterUpdate) }));
+        for entry in [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap] {
+            assert_no_circle(sharing(Config { sleep: true, ..three(entry) }));
+        }
     }
 }
 
@@ -168,7 +172,9 @@ mod full {
     #[test]
     #[ignore = "minutes, see README.md"]
     fn shared() {
-        explore(super::shared::shared(Config { sleep: true, ..three(Entry::AfterUpdate) }));
+        for entry in [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap] {
+            explore(super::shared::sharing(Config { sleep: true, ..three(entry) }));
+        }
     }
 }
 

@@ -79,9 +79,9 @@ seeded! {
         => property::PROGRESS;
     token_doubled: TokenDoubled in Config { handovers: 1, ..awake() } => property::TOKEN;
     not_looked_again: NotLookedAgain in sharing(2) => property::WAKES;
+    goes_on_with_renderer: GoesOnWithRenderer in sharing(2) => property::WAKES;
     leaves_with_renderer: LeavesWithRenderer in Config { departures: 1, ..sharing(2) }
         => property::PROGRESS;
-    sleeps_with_renderer: SleepsWithRenderer in sharing(2) => property::PROGRESS;
     rendering_calls_holders: RenderingCallsHolders in Config { departures: 1, ..sharing(2) }
         => property::PROGRESS;
 }

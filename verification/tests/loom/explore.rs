@@ -23,7 +23,7 @@ explored! {
     latest: one_reader slots_are_reused two_readers reader_is_replaced readers_are_limited;
     bell: ring_shows_work all_sleepers_end render_wakes_holders_only leaver_passes_it_on;
     token: never_doubled foreign_is_refused static_once;
-    shared: sleepers_end leaver_calls busy_after_it;
+    shared: sleepers_end leaver_calls busy_after_it all_rendered_meanwhile;
     pipeline: spatial_after_update spatial_after_render spatial_after_swap pairwise_after_update
         pairwise_after_render pairwise_after_swap pools_come_round two_tokens shared_renderer
         solitary_unit letters errors_do_no_harm three_pairs rendering_comes_first two_holders_at_a_swap

@@ -30,6 +30,7 @@ fn killer(fault: Fault) -> &'static str {
         LeavesWithRenderer => "shared::leaver_calls",
         SleepsWithRenderer => "shared::sleepers_end",
         NotLookedAgain => "shared::busy_after_it",
+        GoesOnWithRenderer => "shared::all_rendered_meanwhile",
         RenderingCallsHolders => "shared::leaver_calls",
         GateArmedLate => "pipeline::solitary_unit",
         RendersArmedLate => "pipeline::two_holders_at_a_swap",

@@ -81,9 +81,11 @@ const LOOK: u32 = 9 + (2 + POP + 1 + PUSH);
 /// Rendering is looked for first, then anything at home and elsewhere, and at most four times at each home
 /// what was seen may be gone.
 const FIND: u32 = 13 + HOMES as u32 * 4 * LOOK;
-/// A shared renderer is taken if a rendering is seen; or put back if none is, and taken again if one is seen behind
-/// a fence.
-const SHARE_RENDERER: u32 = 3 + 1 + 1 + 3 + 2;
+/// A shared renderer is put back, and a rendering looked for behind a fence.
+const PUT_BACK: u32 = 1 + 1 + 3;
+/// It is taken if a rendering is seen; or put back if none is, and taken again if one is seen all the same. It is put
+/// back where others have rendered what was seen.
+const SHARE_RENDERER: u32 = 3 + PUT_BACK + 2 + PUT_BACK;
 /// Where nobody takes away what was seen.
 const FIND_ALONE: u32 = 3 + (HOMES as u32 - 1) * 9 + LOOK;
 /// Once round a loop whose word another thread changed.

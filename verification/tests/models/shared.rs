@@ -2,16 +2,17 @@
 //!
 //! A worker that sleeps for ever, or a rendering that nobody comes for, exceeds loom's limit of branches.
 
-use super::ve::{Setup, build, step, verify};
+use super::ve::{Setup, World, build, step, verify};
 use super::{Model, Role, check, together};
 use dualframe_core_model::frame::Entry;
 use dualframe_core_model::stage::Stage;
-use dualframe_core_model::worker::Step;
+use dualframe_core_model::worker::{Step, Worker};
 
 pub(crate) const ALL: &[Model] = &[
     ("shared::leaver_calls", leaver_calls),
     ("shared::sleepers_end", sleepers_end),
     ("shared::busy_after_it", busy_after_it),
+    ("shared::all_rendered_meanwhile", all_rendered_meanwhile),
 ];
 
 /// Two units that do not interact, one at each worker's home, and a renderer left to both workers.
@@ -54,6 +55,36 @@ fn busy_after_it() {
         let entry = Entry::AfterRender;
         let setup = Setup { far: true, entry, shared: true, patient: true, ..Setup::DEFAULT };
         rendered(setup, order)
+    });
+}
+
+/// A worker sees a rendering, of unit 0, and takes the renderer when the other one has rendered that: it may go on with
+/// work that takes long, here with unit 1's update, until unit 3 is rendered, which the other one updates. The outcome is
+/// how many units each rendered: unit 1 may be the first one's.
+fn all_rendered_meanwhile() {
+    check("shared::all_rendered_meanwhile", Some(2), 2, [[0, 4], [1, 3]], |order| {
+        let setup = Setup { units: 4, patient_update: Some([1, 3]), ..SHARED };
+        let (pipeline, world) = build(setup);
+        let [mut one, mut other] = [0, 1].map(|home| pipeline.worker_at(home));
+        // All enter the frame; the other one, with unit 2 to render, has the renderer when unit 0 is updated.
+        (0..setup.units).for_each(|_| _ = step(&mut one, world));
+        assert_eq!(step(&mut other, world), Step::Worked(Stage::Update));
+        assert_eq!(step(&mut one, world), Step::Worked(Stage::Update));
+        let role = |mut worker: Worker<'static, 'static, World>| -> Role<u32> {
+            Box::new(move || {
+                let mut rendered = 0;
+                while !pipeline.finished() {
+                    match step(&mut worker, world) {
+                        Step::Idle => worker.wait(),
+                        did => rendered += u32::from(did == Step::Worked(Stage::Render)),
+                    }
+                }
+                rendered
+            })
+        };
+        let rendered = together(order, vec![role(one), role(other)]);
+        verify(pipeline, world);
+        [rendered[0], rendered[1]]
     });
 }
 

@@ -61,6 +61,8 @@ pub(crate) struct Setup {
     pub(crate) shared: bool,
     /// Whether unit 0's entry into frame 1 takes until unit 1 is rendered in frame 0.
     pub(crate) patient: bool,
+    /// Of [a, b]: whether unit a's update takes until b is rendered in the same frame.
+    pub(crate) patient_update: Option<[u32; 2]>,
     /// Units from this number on are solitary.
     pub(crate) solitary_from: u32,
     /// Whether unit 0 posts a letter to the last unit in every update.
@@ -85,6 +87,7 @@ impl Setup {
         tokens: 1,
         shared: false,
         patient: false,
+        patient_update: None,
         solitary_from: u32::MAX,
         letters: false,
         fail: false,
@@ -136,6 +139,12 @@ impl World {
         lock(&self.journal).push(event);
     }
 
+    fn await_rendering(&self, unit: u32, frame: u32) {
+        while !lock(&self.journal).contains(&Rendered(unit, frame)) {
+            loom::thread::yield_now();
+        }
+    }
+
     fn outcome(&self) -> Result<(), Failure> {
         if self.setup.fail { Err(Failure::Asked) } else { Ok(()) }
     }
@@ -159,9 +168,7 @@ impl Environment for World {
 
     fn interacts_within(&self, body: &Body) -> bool {
         if self.setup.patient && (body.id, body.updates) == (0, 1) {
-            while !lock(&self.journal).contains(&Rendered(1, 0)) {
-                loom::thread::yield_now();
-            }
+            self.await_rendering(1, 0);
         }
         false
     }
@@ -194,6 +201,11 @@ impl Environment for World {
     ) -> Result<(), Failure> {
         assert_eq!((unit.0, frame.0), (body.id, body.updates), "updates in order");
         note(|did| did.stage = Stage::Update);
+        if let Some([_, rendered]) =
+            self.setup.patient_update.filter(|[patient, _]| *patient == unit.0)
+        {
+            self.await_rendering(rendered, frame.0);
+        }
         let mut before = None;
         for interaction in inputs.interactions() {
             assert!(before < Some(interaction.other), "interactions in pair order");
