@@ -182,9 +182,18 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         }
     }
 
+    /// Puts the shared renderer back, if this worker has it, and calls somebody for what there is to render all the same,
+    /// ahead of this step's work.
+    #[inline]
+    pub(crate) fn gives_renderer_up(&mut self) {
+        if self.puts_renderer_back_and_sees() {
+            *self.calls_for(Stage::Render) += 1;
+        }
+    }
+
     /// Puts the shared renderer back, if this worker has it, and says whether there is something to render all the
     /// same: whoever found it taken meanwhile may sleep before this worker's next step.
-    pub(crate) fn puts_renderer_back_and_sees(&mut self) -> bool {
+    fn puts_renderer_back_and_sees(&mut self) -> bool {
         if !self.renders_shared {
             return false;
         }

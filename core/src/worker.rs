@@ -147,14 +147,11 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         {
             return Some(work);
         }
-        // All that was seen is rendered, by somebody else. No rendering is to wait for what this worker does instead,
-        // and one that came meanwhile is for its next step.
-        if !self.carry.has_rendering()
-            && !seeded!(GoesOnWithRenderer)
-            && self.carry.puts_renderer_back_and_sees()
-        {
-            return None;
+        // All that was seen is rendered, by somebody else: no rendering is to wait for what this worker does instead.
+        if !self.carry.has_rendering() && !seeded!(GoesOnWithRenderer) {
+            self.carry.gives_renderer_up();
         }
+        let holder = self.token.is_some() || self.carry.renders_shared;
         if let Some(work) = self.carry.take() {
             return Some(work);
         }

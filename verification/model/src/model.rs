@@ -55,7 +55,7 @@ impl Protocol {
             | At::Advancing(_)
             | At::Rendered(_)
             | At::Reentering(_) => carries.iter().for_each(|&carry| may(Act::Go { carry })),
-            At::Ringing | At::Leaving { .. } => self.rings(state, worker, &mut may),
+            At::Ringing | At::Calling | At::Leaving { .. } => self.rings(state, worker, &mut may),
             At::Asleep => {}
             _ => may(Act::Go { carry: false }),
         }
@@ -80,7 +80,9 @@ impl Protocol {
         let config = &self.0;
         let blind = config.has(Bug::RenderedAhead) && me.holds;
         let seen = state.queue.iter().filter(|work| blind && work.is_rendering());
-        let renders = config.shared && me.holds && !config.has(Bug::GoesOnWithRenderer);
+        let mut all = state.work(me, me.holds);
+        let goes_on = config.has(Bug::GoesOnWithRenderer) && !all.any(Work::is_rendering);
+        let renders = config.shared && me.holds && !goes_on;
         let all = state.work(me, me.holds).chain(seen);
         let work: BTreeSet<Work> = all.filter(|work| !renders || work.is_rendering()).collect();
         work.iter().for_each(|&work| may(Act::Take(work)));
@@ -93,9 +95,7 @@ impl Protocol {
     /// What the host may do to a worker between two steps, and what others' hunger may.
     fn by_host(&self, state: &State, me: &Worker, may: &mut impl FnMut(Act)) {
         let config = &self.0;
-        // Somebody stays: whoever holds a token, or else anyone.
-        let stays = |worker: &&Worker| worker.is_present() && !worker.is_leaving();
-        let others = state.workers.iter().filter(stays).count() - 1;
+        let others = state.workers.iter().filter(|worker| worker.is_present()).count() - 1;
         if !config.shared && me.holds && state.handovers > 0 && others > 0 {
             may(Act::Release);
         }
@@ -105,6 +105,9 @@ impl Protocol {
         if !me.carried.is_empty() && config.sleep {
             may(Act::Share);
         }
+        // Somebody stays: whoever holds a token, or else anyone.
+        let stays = |worker: &&Worker| worker.is_present() && !worker.is_leaving();
+        let others = state.workers.iter().filter(stays).count() - 1;
         if state.departures > 0 && others > 0 && !me.is_holder(config) && !me.offers {
             may(Act::Leave);
         }

@@ -12,7 +12,7 @@ use stateright::Model;
 
 use crate::config::Config;
 use crate::model::{Action, Protocol};
-use crate::state::{At, State, Worker};
+use crate::state::{At, Because, State, Worker};
 use crate::step::Act;
 use crate::trace::{Event, Seen, Task};
 use crate::work::Work;
@@ -128,7 +128,7 @@ fn only_frees(at: At) -> bool {
             | At::Opening(..)
             | At::Interacted(_)
             | At::Passing { .. }
-            | At::PuttingBack { gone: true }
+            | At::PuttingBack(Because::Leaves)
             | At::Advancing(_)
             | At::Rendered(_)
             | At::Reentering(_)

@@ -212,10 +212,8 @@ impl Step<'_> {
             At::Rendered(unit) => self.render_counted(unit),
             At::Counting => self.count_rendered(),
             At::Reentering(unit) => self.advance(unit, Then::Enter(unit + 1)),
-            At::Taking | At::PuttingBack { .. } | At::LookingAgain => self.go_sharing(),
-            At::GoingOn if self.worker().holds && !self.config.has(Bug::GoesOnWithRenderer) => {
-                self.go_sharing();
-            }
+            At::Taking | At::PuttingBack(_) | At::LookingAgain(_) => self.go_sharing(),
+            At::GoingOn if self.worker().holds => self.go_sharing(),
             _ => self.go_waiting(),
         }
     }

@@ -43,6 +43,17 @@ pub enum Then {
     Enter(u8),
 }
 
+/// Why a worker puts the shared renderer back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Because {
+    /// It has seen no rendering.
+    NothingSeen,
+    /// What it had seen when it took it, others have rendered.
+    NothingLeft,
+    /// It leaves for good.
+    Leaves,
+}
+
 /// Where a worker is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum At {
@@ -98,13 +109,12 @@ pub enum At {
     },
     /// Has seen a rendering: takes the shared renderer, if it is free.
     Taking,
-    /// Has seen no rendering, or leaves for good: puts the shared renderer back.
-    PuttingBack {
-        /// For good.
-        gone: bool,
-    },
+    /// Puts the shared renderer back.
+    PuttingBack(Because),
     /// Has put the shared renderer back, and looks for renderings once more.
-    LookingAgain,
+    LookingAgain(Because),
+    /// Has seen a rendering then, and rings for it.
+    Calling,
     /// Has looked for renderings, and goes on: with one if it has the shared renderer, or with whatever it finds.
     GoingOn,
     /// Its step found nothing to do: it will sleep.
@@ -178,7 +188,7 @@ impl Worker {
 
     /// Whether it is about to leave for good.
     pub(crate) fn is_leaving(&self) -> bool {
-        matches!(self.at, At::PuttingBack { gone: true } | At::Leaving { gone: true })
+        matches!(self.at, At::PuttingBack(Because::Leaves) | At::Leaving { gone: true })
     }
 
     pub(crate) fn is_present(&self) -> bool {

@@ -1,7 +1,7 @@
 //! Sleeping, waking, leaving (`core/src/wait.rs`, and what a worker does about it).
 
 use crate::config::{Bug, Config};
-use crate::state::{At, State, Worker};
+use crate::state::{At, Because, State, Worker};
 use crate::step::Step;
 use crate::work::Works;
 
@@ -33,7 +33,7 @@ impl Step<'_> {
         self.shed();
         let puts_back = self.config.shared && self.worker().holds;
         self.goes_to(if puts_back && !self.config.has(Bug::LeavesWithRenderer) {
-            At::PuttingBack { gone }
+            At::PuttingBack(Because::Leaves)
         } else {
             At::Leaving { gone }
         });
@@ -100,6 +100,7 @@ impl Step<'_> {
         let worker = self.worker();
         (worker.queued, worker.renders, worker.at) = (0, 0, At::Awake);
         match leaving {
+            At::Calling => worker.at = At::GoingOn,
             At::Leaving { gone: true } => worker.at = At::Gone,
             At::Leaving { gone: false } => {
                 (worker.holds, worker.offers) = (doubled, true);

@@ -60,7 +60,7 @@ fn busy_after_it() {
 
 /// A worker sees a rendering, of unit 0, and takes the renderer when the other one has rendered that: it may go on with
 /// work that takes long, here with unit 1's update, until unit 3 is rendered, which the other one updates. The outcome is
-/// how many units each rendered: unit 1 may be the first one's.
+/// how many units each rendered.
 fn all_rendered_meanwhile() {
     check("shared::all_rendered_meanwhile", Some(2), 2, [[0, 4], [1, 3]], |order| {
         let setup = Setup { units: 4, patient_update: Some([1, 3]), ..SHARED };
