@@ -133,8 +133,8 @@ impl<R> Shared<R> {
         self.is_free() && self.free.exchange(1, 0, site::SHARED_TAKE).is_ok()
     }
 
-    /// The caller, who has it, puts it back. Before it sleeps or leaves it has to look again for something to
-    /// render: whoever queued that before may have found it taken.
+    /// The caller, who has it, puts it back. Before it does other work, sleeps or leaves it has to look again for
+    /// something to render, behind a fence: whoever queued that before may have found it taken.
     #[inline]
     pub(crate) fn put_back(&self) {
         self.free.store(1, site::SHARED_PUT);

@@ -22,7 +22,9 @@ fn sources() -> Vec<(String, String)> {
         let name = path.file_name().expect("a name").to_string_lossy().into_owned();
         (name, code.collect::<Vec<_>>().join("\n"))
     };
-    files.map(read).collect()
+    let mut all: Vec<_> = files.map(read).collect();
+    all.retain(|(name, _)| !name.ends_with("_tests.rs"));
+    all
 }
 
 /// What gives access to memory that threads share, other than by a site.
