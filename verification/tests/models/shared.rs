@@ -2,10 +2,11 @@
 //!
 //! A worker that sleeps for ever, or a rendering that nobody comes for, exceeds loom's limit of branches.
 
-use super::ve::{Setup, World, build, step, verify};
+use super::ve::{Piped, Setup, World, build, step, verify};
 use super::{Model, Role, check, together};
 use dualframe_core_model::frame::Entry;
 use dualframe_core_model::stage::Stage;
+use dualframe_core_model::wait::Spin;
 use dualframe_core_model::worker::{Step, Worker};
 
 pub(crate) const ALL: &[Model] = &[
@@ -58,6 +59,18 @@ fn busy_after_it() {
     });
 }
 
+/// Steps until the end, and sleeps where there is nothing to do. How many units it rendered.
+fn stay(pipeline: &Piped<Spin>, world: &World, mut worker: Worker<'static, 'static, World>) -> u32 {
+    let mut rendered = 0;
+    while !pipeline.finished() {
+        match step(&mut worker, world) {
+            Step::Idle => worker.wait(),
+            did => rendered += u32::from(did == Step::Worked(Stage::Render)),
+        }
+    }
+    rendered
+}
+
 /// A worker sees a rendering, of unit 0, and takes the renderer when the other one has rendered that: it may go on with
 /// work that takes long, here with unit 1's update, until unit 3 is rendered, which the other one updates. The outcome is
 /// how many units each rendered.
@@ -70,18 +83,7 @@ fn all_rendered_meanwhile() {
         (0..setup.units).for_each(|_| _ = step(&mut one, world));
         assert_eq!(step(&mut other, world), Step::Worked(Stage::Update));
         assert_eq!(step(&mut one, world), Step::Worked(Stage::Update));
-        let role = |mut worker: Worker<'static, 'static, World>| -> Role<u32> {
-            Box::new(move || {
-                let mut rendered = 0;
-                while !pipeline.finished() {
-                    match step(&mut worker, world) {
-                        Step::Idle => worker.wait(),
-                        did => rendered += u32::from(did == Step::Worked(Stage::Render)),
-                    }
-                }
-                rendered
-            })
-        };
+        let role = |worker| -> Role<u32> { Box::new(move || stay(pipeline, world, worker)) };
         let rendered = together(order, vec![role(one), role(other)]);
         verify(pipeline, world);
         [rendered[0], rendered[1]]
@@ -98,18 +100,8 @@ fn leaver_calls() {
             (0..order / 2).for_each(|_| _ = step(&mut worker, world));
             0
         });
-        let stay: Role<u32> = Box::new(move || {
-            let mut worker = pipeline.worker_at(1);
-            let mut rendered = 0;
-            while !pipeline.finished() {
-                match step(&mut worker, world) {
-                    Step::Idle => worker.wait(),
-                    did => rendered += u32::from(did == Step::Worked(Stage::Render)),
-                }
-            }
-            rendered
-        });
-        let rendered = together(order, vec![leave, stay])[1];
+        let staying: Role<u32> = Box::new(|| stay(pipeline, world, pipeline.worker_at(1)));
+        let rendered = together(order, vec![leave, staying])[1];
         verify(pipeline, world);
         rendered
     });
