@@ -12,26 +12,24 @@ use dualframe_protocol::replay::{Replayed, replay};
 use dut::frame::Entry;
 use dut::pipeline::BroadPhase;
 use proptest::prelude::*;
-use record::{Park, Setup, judge, run};
+use record::{Park, Renderer, Setup, judge, run};
 
 fn setups() -> impl Strategy<Value = (Setup, u32)> {
     let broad_phase = prop_oneof![Just(BroadPhase::Spatial), Just(BroadPhase::Pairwise)];
     let entry =
         prop_oneof![Just(Entry::AfterUpdate), Just(Entry::AfterRender), Just(Entry::AfterSwap)];
-    // The second way is one token, shared.
-    let tokens = prop_oneof![(1..=2_u32, Just(false)), Just((1, true))];
-    let sizes = (1..=7_u32, 1..=5_u32, tokens, 1..=4_u32);
+    let renderer = prop_oneof![(1..=2_u32).prop_map(Renderer::Tokens), Just(Renderer::Shared)];
+    let sizes = (1..=7_u32, 1..=5_u32, renderer, 1..=4_u32);
     let chances = (any::<u64>(), 0..100_u64, prop_oneof![Just(0), 0..128_u32]);
     (broad_phase, entry, sizes, chances).prop_map(|(broad_phase, entry, sizes, chances)| {
-        let (units, frames, (tokens, shared), workers) = sizes;
+        let (units, frames, renderer, workers) = sizes;
         let (seed, near_percent, solitary) = chances;
         let setup = Setup {
             units,
             frames,
             broad_phase,
             entry,
-            tokens,
-            shared,
+            renderer,
             homes: 2,
             seed,
             near_percent,

@@ -11,19 +11,18 @@ use dualframe_protocol::replay::replay;
 use dualframe_protocol::trace::{Event, Seen, Task};
 use dut::frame::Entry;
 use dut::pipeline::BroadPhase;
-use record::{Park, Setup, judge, run};
+use record::{Park, Renderer, Setup, judge, run};
 
 /// Four units of which most pairs are near, three frames, three workers.
-fn real(broad_phase: BroadPhase, entry: Entry, shared: bool) -> (Config, Vec<Seen>) {
-    let (tokens, seed, near_percent, solitary) = (1, 5, 60, 0);
+fn real(broad_phase: BroadPhase, entry: Entry, renderer: Renderer) -> (Config, Vec<Seen>) {
+    let (seed, near_percent, solitary) = (5, 60, 0);
     let (units, frames) = (4, 3);
     let setup = Setup {
         units,
         frames,
         broad_phase,
         entry,
-        tokens,
-        shared,
+        renderer,
         homes: 2,
         seed,
         near_percent,
@@ -45,9 +44,11 @@ fn refused(name: &str, change: impl Fn(&mut Vec<Seen>, usize) -> Option<()>) {
     let mut changes = 0;
     for broad_phase in [BroadPhase::Spatial, BroadPhase::Pairwise] {
         let entries = [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap];
-        let ways = entries.into_iter().flat_map(|entry| [(entry, false), (entry, true)]);
-        for (entry, shared) in ways {
-            let (config, record) = real(broad_phase, entry, shared);
+        let renderers = [Renderer::Tokens(1), Renderer::Shared];
+        let ways =
+            entries.into_iter().flat_map(|entry| renderers.map(|renderer| (entry, renderer)));
+        for (entry, renderer) in ways {
+            let (config, record) = real(broad_phase, entry, renderer);
             for at in 0..record.len() {
                 let mut changed = record.clone();
                 if !is_step(record[at].event) || change(&mut changed, at).is_none() {

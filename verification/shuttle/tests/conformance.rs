@@ -13,6 +13,7 @@ use std::time::Instant;
 use dualframe_protocol::replay::replay;
 use dut::frame::Entry;
 use dut::pipeline::BroadPhase;
+use record::Renderer::{Shared, Tokens};
 use record::{Park, Setup, judge, run};
 use shuttle::Runner;
 use shuttle::scheduler::{PctScheduler, RandomScheduler, Scheduler};
@@ -23,17 +24,16 @@ fn setups() -> impl Iterator<Item = Setup> {
     let ways = [BroadPhase::Spatial, BroadPhase::Pairwise]
         .into_iter()
         .flat_map(move |broad_phase| entries.map(|entry| (broad_phase, entry)))
-        .flat_map(|way| [(1, false), (2, false), (1, true)].map(|tokens| (way, tokens)));
-    (1..).zip(ways).map(|(seed, ((broad_phase, entry), (tokens, shared)))| {
+        .flat_map(|way| [Tokens(1), Tokens(2), Shared].map(|renderer| (way, renderer)));
+    (1..).zip(ways).map(|(seed, ((broad_phase, entry), renderer))| {
         let (units, frames, near_percent) = (5, 3, 40);
-        let solitary = if tokens == 2 { 4 } else { 0 };
+        let solitary = if renderer == Tokens(2) { 4 } else { 0 };
         Setup {
             units,
             frames,
             broad_phase,
             entry,
-            tokens,
-            shared,
+            renderer,
             homes: 2,
             seed,
             near_percent,

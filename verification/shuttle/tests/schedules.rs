@@ -19,37 +19,27 @@ use dut::frame::Entry;
 use dut::pipeline::BroadPhase;
 use dut::wait::{Bell, Epoch, Waiting};
 use os::{Condvar, Mutex};
-use record::{Park, Setup, judge, run};
+use record::{Park, Renderer, Setup, judge, run};
 use shuttle::scheduler::{PctScheduler, RandomScheduler, ReplayScheduler, Scheduler};
 use shuttle::{FailurePersistence, Runner};
 
 /// The ways of running among which the schedules are divided.
 const WAYS: [(BroadPhase, Entry, Renderer); 5] = [
-    (BroadPhase::Spatial, Entry::AfterUpdate, Renderer::Bound),
+    (BroadPhase::Spatial, Entry::AfterUpdate, Renderer::Tokens(1)),
     (BroadPhase::Spatial, Entry::AfterUpdate, Renderer::Shared),
-    (BroadPhase::Pairwise, Entry::AfterUpdate, Renderer::Bound),
-    (BroadPhase::Spatial, Entry::AfterRender, Renderer::Bound),
+    (BroadPhase::Pairwise, Entry::AfterUpdate, Renderer::Tokens(1)),
+    (BroadPhase::Spatial, Entry::AfterRender, Renderer::Tokens(1)),
     (BroadPhase::Pairwise, Entry::AfterSwap, Renderer::Shared),
 ];
 
-/// Whose the renderer is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Renderer {
-    /// A token's.
-    Bound,
-    /// Left to all workers.
-    Shared,
-}
-
 fn setup((broad_phase, entry, renderer): (BroadPhase, Entry, Renderer)) -> Setup {
-    let (tokens, seed, near_percent, solitary) = (1, 7, 15, 0);
+    let (seed, near_percent, solitary) = (7, 15, 0);
     Setup {
         units: 12,
         frames: 4,
         broad_phase,
         entry,
-        tokens,
-        shared: renderer == Renderer::Shared,
+        renderer,
         homes: 2,
         seed,
         near_percent,

@@ -2,7 +2,7 @@
 //!
 //! A worker that sleeps for ever, or a rendering that nobody comes for, exceeds loom's limit of branches.
 
-use super::ve::{Piped, Setup, World, build, step, verify};
+use super::ve::{Patience, Piped, Setup, World, build, step, verify};
 use super::{Model, Role, check, together};
 use dualframe_core_model::frame::Entry;
 use dualframe_core_model::stage::Stage;
@@ -54,7 +54,8 @@ fn busy_after_it() {
     let each = (0..=4).map(|rendered| [rendered, 4 - rendered]);
     check("shared::busy_after_it", Some(1), 2, each, |order| {
         let entry = Entry::AfterRender;
-        let setup = Setup { far: true, entry, shared: true, patient: true, ..Setup::DEFAULT };
+        let patience = Patience::Entry;
+        let setup = Setup { far: true, entry, shared: true, patience, ..Setup::DEFAULT };
         rendered(setup, order)
     });
 }
@@ -76,7 +77,7 @@ fn stay(pipeline: &Piped<Spin>, world: &World, mut worker: Worker<'static, 'stat
 /// how many units each rendered.
 fn all_rendered_meanwhile() {
     check("shared::all_rendered_meanwhile", Some(2), 2, [[0, 4], [1, 3]], |order| {
-        let setup = Setup { units: 4, patient_update: Some([1, 3]), ..SHARED };
+        let setup = Setup { units: 4, patience: Patience::Update, ..SHARED };
         let (pipeline, world) = build(setup);
         let [mut one, mut other] = [0, 1].map(|home| pipeline.worker_at(home));
         // All enter the frame; the other one, with unit 2 to render, has the renderer when unit 0 is updated.

@@ -42,6 +42,17 @@ pub(crate) struct Body {
     value: u32,
 }
 
+/// A callback that takes until a unit is rendered in frame 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Patience {
+    /// None does.
+    None,
+    /// Unit 0's entry into frame 1, until unit 1 is.
+    Entry,
+    /// Unit 1's update in frame 0, until unit 3 is.
+    Update,
+}
+
 /// Size and configuration of a model.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Setup {
@@ -59,10 +70,8 @@ pub(crate) struct Setup {
     pub(crate) tokens: u32,
     /// Whether the renderer is left to all workers.
     pub(crate) shared: bool,
-    /// Whether unit 0's entry into frame 1 takes until unit 1 is rendered in frame 0.
-    pub(crate) patient: bool,
-    /// Of [a, b]: whether unit a's update takes until b is rendered in the same frame.
-    pub(crate) patient_update: Option<[u32; 2]>,
+    /// What takes long.
+    pub(crate) patience: Patience,
     /// Units from this number on are solitary.
     pub(crate) solitary_from: u32,
     /// Whether unit 0 posts a letter to the last unit in every update.
@@ -86,8 +95,7 @@ impl Setup {
         entry: Entry::AfterUpdate,
         tokens: 1,
         shared: false,
-        patient: false,
-        patient_update: None,
+        patience: Patience::None,
         solitary_from: u32::MAX,
         letters: false,
         fail: false,
@@ -139,8 +147,8 @@ impl World {
         lock(&self.journal).push(event);
     }
 
-    fn await_rendering(&self, unit: u32, frame: u32) {
-        while !lock(&self.journal).contains(&Rendered(unit, frame)) {
+    fn await_rendering(&self, unit: u32) {
+        while !lock(&self.journal).contains(&Rendered(unit, 0)) {
             loom::thread::yield_now();
         }
     }
@@ -167,8 +175,8 @@ impl Environment for World {
     }
 
     fn interacts_within(&self, body: &Body) -> bool {
-        if self.setup.patient && (body.id, body.updates) == (0, 1) {
-            self.await_rendering(1, 0);
+        if self.setup.patience == Patience::Entry && (body.id, body.updates) == (0, 1) {
+            self.await_rendering(1);
         }
         false
     }
@@ -201,10 +209,8 @@ impl Environment for World {
     ) -> Result<(), Failure> {
         assert_eq!((unit.0, frame.0), (body.id, body.updates), "updates in order");
         note(|did| did.stage = Stage::Update);
-        if let Some([_, rendered]) =
-            self.setup.patient_update.filter(|[patient, _]| *patient == unit.0)
-        {
-            self.await_rendering(rendered, frame.0);
+        if self.setup.patience == Patience::Update && (unit.0, frame.0) == (1, 0) {
+            self.await_rendering(3);
         }
         let mut before = None;
         for interaction in inputs.interactions() {

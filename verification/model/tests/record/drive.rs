@@ -9,7 +9,7 @@ use crate::dut::wait::{Bell, Epoch, Waiting};
 use crate::dut::worker::Step;
 use crate::os::{self, Condvar, Mutex};
 
-use super::{Host, Recorder, Screen, Setup, Slots};
+use super::{Host, Recorder, Renderer, Screen, Setup, Slots};
 
 /// Sleeps on condition variables, for as long as it takes: a wake-up that is lost is a hang.
 #[derive(Default)]
@@ -40,10 +40,13 @@ pub(crate) fn run<W: Waiting>(setup: &Setup, workers: u32, waiting: W) -> (Vec<S
     let recorder = Recorder::default();
     let mut slots = Slots::new(setup);
     let mut pipeline = slots.pipeline(setup, waiting);
-    if setup.shared {
-        pipeline.share(Screen).map_err(drop).expect("no token is out");
-    }
-    let tokens = if setup.shared { 0 } else { setup.tokens };
+    let tokens = match setup.renderer {
+        Renderer::Tokens(tokens) => tokens,
+        Renderer::Shared => {
+            pipeline.share(Screen).map_err(drop).expect("no token is out");
+            0
+        }
+    };
     let token = |_| pipeline.token(Screen).map_err(drop).expect("a token");
     let shop: Shop<'_> = Mutex::new((0..tokens).map(token).collect());
     os::scope(|scope| {
@@ -57,7 +60,7 @@ pub(crate) fn run<W: Waiting>(setup: &Setup, workers: u32, waiting: W) -> (Vec<S
         }
     });
     drop(shop);
-    assert_eq!(pipeline.take_back().is_some(), setup.shared);
+    assert_eq!(pipeline.take_back().is_some(), setup.renderer == Renderer::Shared);
     let values = pipeline.objects_mut().map(|body| body.value).collect();
     drop(pipeline);
     (recorder.into_record(), values)

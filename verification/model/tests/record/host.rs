@@ -15,6 +15,25 @@ use crate::dut::pipeline::BroadPhase;
 use crate::dut::probe::Probe;
 use crate::dut::unit::{UnitId, Work};
 
+/// Whose the renderer is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Renderer {
+    /// That of each of so many tokens.
+    Tokens(u32),
+    /// Left to all workers.
+    Shared,
+}
+
+impl Renderer {
+    /// The tokens that the pipeline has; a shared renderer has the one there is.
+    pub(crate) fn tokens(self) -> u32 {
+        match self {
+            Self::Tokens(tokens) => tokens,
+            Self::Shared => 1,
+        }
+    }
+}
+
 /// A virtual environment and how it runs.
 #[derive(Clone, Debug)]
 pub(crate) struct Setup {
@@ -22,10 +41,7 @@ pub(crate) struct Setup {
     pub(crate) frames: u32,
     pub(crate) broad_phase: BroadPhase,
     pub(crate) entry: Entry,
-    /// 1 where the renderer is shared.
-    pub(crate) tokens: u32,
-    /// Whether the renderer is left to all workers.
-    pub(crate) shared: bool,
+    pub(crate) renderer: Renderer,
     pub(crate) homes: u32,
     /// Decides which pairs are modelled, and which are near in which frame.
     pub(crate) seed: u64,
@@ -60,8 +76,8 @@ impl Setup {
                 Entry::AfterRender => config::Entry::AfterRender,
                 Entry::AfterSwap => config::Entry::AfterSwap,
             },
-            tokens: self.tokens as u8,
-            shared: self.shared,
+            tokens: self.renderer.tokens() as u8,
+            shared: self.renderer == Renderer::Shared,
             solitary: solitary.fold(0, |bits, unit| bits | 1 << unit),
             ..Config::new(1, self.units as u8, &pairs, self.frames as u8)
         }

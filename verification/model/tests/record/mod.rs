@@ -8,7 +8,7 @@ mod host;
 mod judge;
 
 pub(crate) use drive::{Park, run};
-pub(crate) use host::{Body, Host, Recorder, Screen, Setup};
+pub(crate) use host::{Body, Host, Recorder, Renderer, Screen, Setup};
 pub(crate) use judge::judge;
 
 use crate::dut::contacts::{ContactSlot, SegmentSlot};
@@ -73,8 +73,8 @@ impl Slots {
             letters: &mut self.letters,
             queues: &mut self.queues,
         };
-        let Setup { broad_phase, entry, tokens, homes, .. } = *setup;
-        let config = Config { broad_phase, entry, tokens, homes };
+        let Setup { broad_phase, entry, renderer, homes, .. } = *setup;
+        let config = Config { broad_phase, entry, tokens: renderer.tokens(), homes };
         let mut pipeline = Pipeline::new(memory, config, waiting).expect("memory that fits");
         pipeline.run(setup.frames).expect("a pipeline at rest");
         pipeline
