@@ -52,7 +52,7 @@ pub struct IndexRing<'m> {
 }
 
 impl<'m> IndexRing<'m> {
-    /// An empty ring over the largest power of two of `slots`.
+    /// An empty ring over the largest power of two of `slots`, at most 2^32: so many indices there are.
     ///
     /// # Errors
     /// [`TableFull`] if `slots` is empty.
@@ -60,13 +60,13 @@ impl<'m> IndexRing<'m> {
         Self::holding(0, slots)
     }
 
-    /// A ring over the largest power of two of `slots`, which holds the indices below `count`, the
-    /// least first.
+    /// A ring over the largest power of two of `slots`, at most 2^32, which holds the indices below
+    /// `count`, the least first.
     ///
     /// # Errors
-    /// [`TableFull`] if there are fewer slots than that, or none.
+    /// [`TableFull`] if the ring has fewer slots than that, or none.
     pub fn holding(count: usize, slots: &'m mut [QueueSlot]) -> Result<Self, TableFull> {
-        let slot_bits = slots.len().checked_ilog2().unwrap_or(0);
+        let slot_bits = slots.len().checked_ilog2().unwrap_or(0).min(u32::BITS);
         let capacity = if slots.is_empty() { 0 } else { 1 << slot_bits };
         let needed = count.max(1);
         let full = TableFull { table: Table::Queues, capacity, needed };
