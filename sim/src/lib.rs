@@ -35,6 +35,7 @@ pub mod device;
 pub mod executor;
 #[cfg(feature = "experiment")]
 pub mod experiment;
+mod fill;
 pub mod geometry;
 #[cfg(feature = "image")]
 pub mod image;

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
-use std::thread::{self, available_parallelism};
+use std::thread::available_parallelism;
 
 /// How often a thread looks before it goes to sleep: some tens of microseconds, about a stage's tail; on
 /// processors that take long to pause, up to 200.
@@ -83,20 +83,12 @@ impl Barrier {
     }
 }
 
-/// Breaks a barrier if this thread panics: the others would wait for it.
-pub(super) struct OnPanic<'b>(pub(super) &'b Barrier);
-
-impl Drop for OnPanic<'_> {
-    fn drop(&mut self) {
-        if thread::panicking() {
-            self.0.break_off();
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::thread;
+
     use super::*;
+    use crate::executor::on_panic::OnPanic;
 
     #[test]
     fn nobody_waits_for_who_has_panicked() {
@@ -105,7 +97,7 @@ mod tests {
             let waits = || scope.spawn(|| barrier.wait());
             let waiting = [waits(), waits()];
             let panics = scope.spawn(|| {
-                let _guard = OnPanic(&barrier);
+                let _guard = OnPanic(|| barrier.break_off());
                 panic!("on purpose");
             });
             assert!(panics.join().is_err());
@@ -119,7 +111,7 @@ mod tests {
         const THREADS: usize = 3;
         let barrier = Barrier::new(THREADS);
         let entered = AtomicUsize::new(0);
-        std::thread::scope(|scope| {
+        thread::scope(|scope| {
             for _ in 0..THREADS {
                 scope.spawn(|| {
                     for round in 1..=200 {

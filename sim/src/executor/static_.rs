@@ -6,10 +6,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, Rw
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::barrier::{Barrier, OnPanic};
+use super::barrier::Barrier;
 use super::clock::{Clock, Stage, StageSeconds, Timer};
 use super::engine::check_threads;
 use super::mail::Mail;
+use super::on_panic::OnPanic;
 use super::outside::Outside;
 use super::world::{self, Candidates, Outbox, Outcome, Partners, World};
 use super::{Executor, ExecutorError, FrameRecord, OnFrame};
@@ -187,7 +188,7 @@ impl Shared {
 
     /// One thread's share of a frame.
     fn compute(&self, worker: usize, own: &mut Own) {
-        let _guard = OnPanic(&self.barrier);
+        let _guard = OnPanic(|| self.barrier.break_off());
         self.broad_phase(worker);
         self.barrier.wait();
         if worker == 0 {

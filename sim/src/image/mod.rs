@@ -30,7 +30,9 @@ pub use hounsfield::{AIR, ThresholdError, Thresholds};
 pub use nifti::{Voxel, save, write};
 
 use samples::Samples;
-use stream::{Stream, fill};
+use stream::Stream;
+
+use crate::fill::fill;
 
 /// An image of computed tomography.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,6 +5,7 @@ use std::io::{self, BufRead, BufReader, Read};
 use flate2::bufread::MultiGzDecoder;
 
 use super::error::ImageError;
+use crate::fill::fill;
 
 /// The bytes of a file, unpacked.
 pub(super) struct Stream<'a> {
@@ -76,18 +77,4 @@ impl<'a> Stream<'a> {
             _ => ImageError::Io(source),
         }
     }
-}
-
-/// Reads until `bytes` are full or the source ends; the number of bytes read.
-pub(super) fn fill(source: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
-    let mut found = 0;
-    while found < bytes.len() {
-        match source.read(&mut bytes[found..]) {
-            Ok(0) => break,
-            Ok(count) => found += count,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(found)
 }

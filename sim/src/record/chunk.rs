@@ -7,6 +7,7 @@ use flate2::{Compress, Compression, Decompress, FlushCompress, FlushDecompress, 
 
 use super::flaw::Flaw;
 use super::{MAGIC, MAX_PAYLOAD, VERSION};
+use crate::fill::fill;
 
 /// Bytes before a chunk's content: kind, packing, length as stored, length as unpacked, checksum.
 const HEAD: usize = 14;
@@ -105,7 +106,7 @@ impl<R: Read> ChunkReader<R> {
 
     pub(super) fn start(&mut self) -> Result<(), Flaw> {
         let mut start = [0; START];
-        let found = self.fill(&mut start)?;
+        let found = fill(&mut self.read, &mut start).map_err(Flaw::Read)?;
         let (magic, version) = start.split_at(MAGIC.len());
         let known = found.min(MAGIC.len());
         if found == 0 || magic[..known] != MAGIC[..known] {
@@ -125,7 +126,7 @@ impl<R: Read> ChunkReader<R> {
     /// Reads the next chunk's content into `payload`.
     pub(super) fn next(&mut self, payload: &mut Vec<u8>) -> Result<u8, Flaw> {
         let mut head = [0; HEAD];
-        if self.fill(&mut head)? < HEAD {
+        if fill(&mut self.read, &mut head).map_err(Flaw::Read)? < HEAD {
             return Err(Flaw::CutOff);
         }
         let number = |place: usize| {
@@ -164,7 +165,7 @@ impl<R: Read> ChunkReader<R> {
 
     /// Sees that nothing comes after the last chunk.
     pub(super) fn finish(&mut self) -> Result<(), Flaw> {
-        match self.fill(&mut [0])? {
+        match fill(&mut self.read, &mut [0]).map_err(Flaw::Read)? {
             0 => Ok(()),
             _ => Err(Flaw::Trailing),
         }
@@ -188,19 +189,5 @@ impl<R: Read> ChunkReader<R> {
             _ => return Err(Flaw::Packing),
         }
         if payload.len() == length { Ok(()) } else { Err(Flaw::Packing) }
-    }
-
-    /// Reads until `bytes` are full or the source ends; the number of bytes read.
-    fn fill(&mut self, bytes: &mut [u8]) -> Result<usize, Flaw> {
-        let mut found = 0;
-        while found < bytes.len() {
-            match self.read.read(&mut bytes[found..]) {
-                Ok(0) => break,
-                Ok(count) => found += count,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(Flaw::Read(error)),
-            }
-        }
-        Ok(found)
     }
 }

@@ -16,6 +16,7 @@ use super::memory::Limits;
 use super::team::Team;
 use crate::blocking::{Blocking, FRAMES_PER_BLOCKING, Grain};
 use crate::cost::Cost;
+use crate::executor::on_panic::OnPanic;
 use crate::executor::world;
 use crate::pool::{Crew, Pool};
 use crate::timeline::Timeline;
@@ -240,7 +241,7 @@ impl<'s> Context<'s, '_> {
         self.crew.report();
         let mut last = 0;
         while let Some(run) = self.crew.await_run(last, self.pool, index) {
-            let _guard = OnPanic(self.crew);
+            let _guard = OnPanic(|| self.crew.abort());
             let pipeline = read(pipeline);
             self.work(index, &pipeline, &host, None);
             // Whoever left because fewer were wanted may be wanted again in the same batch.
@@ -314,16 +315,4 @@ impl<'s> Context<'s, '_> {
 
 fn read<T>(lock: &RwLock<T>) -> RwLockReadGuard<'_, T> {
     lock.read().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Makes everybody leave if this thread panics: what it had in hand is lost, and the others would
-/// wait for it.
-struct OnPanic<'s>(&'s Crew);
-
-impl Drop for OnPanic<'_> {
-    fn drop(&mut self) {
-        if thread::panicking() {
-            self.0.abort();
-        }
-    }
 }

@@ -1,0 +1,14 @@
+//! What is to happen when a thread panics.
+
+use std::thread;
+
+/// Calls if its thread panics while it lives: the others would wait for what that thread had in hand.
+pub(super) struct OnPanic<F: Fn()>(pub(super) F);
+
+impl<F: Fn()> Drop for OnPanic<F> {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            (self.0)();
+        }
+    }
+}
