@@ -10,11 +10,12 @@ use std::error::Error;
 use std::time::Instant;
 
 use clap::Parser;
+use clap::builder::RangedU64ValueParser;
 use dualframe_render_wgpu::gpu::Gpu;
 use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_render_wgpu::picture::Picture;
 use dualframe_render_wgpu::renderer::{OFFSCREEN_FORMAT, Offscreen, Painter};
-use dualframe_sim::executor::ExecutorKind;
+use dualframe_sim::executor::{ExecutorKind, MAX_THREADS};
 use dualframe_sim::experiment::calibrator::Calibrator;
 use dualframe_sim::experiment::machine::Machine;
 use dualframe_sim::experiment::race::{Runner, WARM_UP};
@@ -38,13 +39,13 @@ const SIZE: (u32, u32) = (320, 180);
 #[derive(Parser)]
 struct Arguments {
     /// Rounds in which the executors take turns.
-    #[arg(long, value_name = "N", default_value_t = 15)]
+    #[arg(long, value_name = "N", default_value_t = 15, value_parser = at_least_one(u64::MAX))]
     rounds: usize,
     /// Numbers of particles.
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [100, 300, 1_000])]
     objects: Vec<usize>,
     /// Threads of the parallel executors.
-    #[arg(long, value_name = "N", default_value_t = 2)]
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = at_least_one(MAX_THREADS as u64))]
     threads: usize,
     /// See only whether it runs.
     #[arg(long)]
@@ -52,6 +53,10 @@ struct Arguments {
     /// What cargo adds.
     #[arg(long, hide = true)]
     bench: bool,
+}
+
+fn at_least_one(most: u64) -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(1..=most)
 }
 
 /// How a drawn run ended: the objects' state, and the last frame's picture.

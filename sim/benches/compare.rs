@@ -35,8 +35,9 @@ fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
     let mut lines = Vec::new();
     for objects in arguments.objects_or(&hundreds) {
         let subject = Subject::Particles(ParticleScene::new(objects));
-        for load in [RenderLoad::Null, RenderLoad::StandIn(StandIn::calibrated(&subject)?)] {
-            let frames = arguments.frames_for(objects, 60_000);
+        let frames = arguments.frames_for(objects, 60_000);
+        let stand_in = StandIn::calibrated(&subject, frames)?;
+        for load in [RenderLoad::Null, RenderLoad::StandIn(stand_in)] {
             let (subject, rounds) = (subject.clone(), arguments.rounds);
             let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };
             let outcome = race.run(&runners, &mut || calibrator.phase(), &mut || ())?;

@@ -3,6 +3,8 @@
 use std::process::ExitCode;
 
 use clap::Parser;
+use clap::builder::RangedU64ValueParser;
+use dualframe_sim::executor::MAX_THREADS;
 use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::machine::Machine;
 use dualframe_sim::experiment::statistics::Quartiles;
@@ -12,16 +14,16 @@ use dualframe_sim::experiment::timing::{Rounds, Series};
 #[derive(Parser)]
 pub(crate) struct Arguments {
     /// Rounds of each race.
-    #[arg(long, value_name = "N", default_value_t = 15)]
+    #[arg(long, value_name = "N", default_value_t = 15, value_parser = at_least_one(u64::MAX))]
     pub(crate) rounds: usize,
     /// Frames of each run; by default about as many as take 150 ms on one thread.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) frames: Option<u64>,
     /// Numbers of particles.
     #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
     pub(crate) objects: Vec<usize>,
     /// Threads of the parallel executors.
-    #[arg(long, value_name = "N", default_value_t = 2)]
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = at_least_one(MAX_THREADS as u64))]
     pub(crate) threads: usize,
     /// See only whether it runs.
     #[arg(long)]
@@ -29,6 +31,10 @@ pub(crate) struct Arguments {
     /// What cargo adds.
     #[arg(long, hide = true)]
     bench: bool,
+}
+
+fn at_least_one(most: u64) -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(1..=most)
 }
 
 impl Arguments {

@@ -8,6 +8,17 @@ pub use dualframe_core::stage::Stage;
 
 use crate::timeline::Timeline;
 
+/// Of so many frames one is timed; usually 31. Reading the system's clock takes some 50 ns, and with one object a unit
+/// every work unit is a change of stage: timing every frame would cost more than synchronising it, and so it would with
+/// executors that time each block. A number without common divisors with the frames of a batch, so that its first ones
+/// are timed no more often than others.
+const FRAMES_PER_SAMPLE: u64 = 31;
+
+/// Whether a frame is timed that is not recorded on a timeline.
+pub(super) fn is_sampled(frame: u64) -> bool {
+    frame.is_multiple_of(FRAMES_PER_SAMPLE)
+}
+
 /// Seconds that one worker spent in each stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageSeconds {
@@ -24,7 +35,44 @@ pub struct StageSeconds {
     pub idle: f64,
 }
 
-/// A worker's clock. Others may read it at any time.
+/// How long frames took, from swap to swap, and how long those of them did that were timed.
+#[derive(Debug)]
+pub(super) struct Running {
+    last: Instant,
+    all: Duration,
+    timed: Duration,
+    is_watched: bool,
+}
+
+impl Running {
+    pub(super) fn new() -> Self {
+        Self { last: Instant::now(), all: Duration::ZERO, timed: Duration::ZERO, is_watched: false }
+    }
+
+    /// Every frame is timed from now on: clocks are to record all of them.
+    pub(super) fn watch(&mut self) {
+        self.is_watched = true;
+    }
+
+    /// The next frame begins now.
+    pub(super) fn begin(&mut self) {
+        self.last = Instant::now();
+    }
+
+    /// The frame `frame` is swapped, at the time that this says, when the next one begins.
+    pub(super) fn swapped(&mut self, frame: u64) -> Instant {
+        let now = Instant::now();
+        let took = now - std::mem::replace(&mut self.last, now);
+        self.all += took;
+        if self.is_watched || is_sampled(frame) {
+            self.timed += took;
+        }
+        now
+    }
+}
+
+/// A worker's clock, which counts in frames that are sampled, or in all if they are recorded on a timeline. Others may
+/// read it at any time.
 #[derive(Debug, Default)]
 pub(super) struct Clock {
     nanoseconds: [AtomicU64; 4],
@@ -38,15 +86,19 @@ impl Clock {
         self.track.get_or_init(|| (timeline, worker));
     }
 
-    /// Counts the time until the guard is dropped towards a stage, which works on `frame`.
+    /// Counts the time until the guard is dropped towards a stage, which works on `frame`, if that is timed.
     pub(super) fn time(&self, stage: Stage, frame: u64) -> Timer<'_> {
-        Timer { clock: self, stage, frame, began: Instant::now() }
+        let is_timed = is_sampled(frame) || self.track.get().is_some();
+        Timer { clock: self, stage, frame, began: is_timed.then(Instant::now) }
     }
 
-    /// What was counted, within so much time of running.
-    pub(super) fn seconds(&self, running: Duration) -> StageSeconds {
-        let seconds =
-            |stage: Stage| self.nanoseconds[stage as usize].load(Ordering::Relaxed) as f64 * 1e-9;
+    /// What was counted, as if all frames had been like those that were timed; all is idle before the first of them.
+    pub(super) fn seconds(&self, running: &Running) -> StageSeconds {
+        let (all, timed) = (running.all.as_secs_f64(), running.timed.as_secs_f64());
+        let frames_for_one = if timed > 0.0 { all / timed } else { 0.0 };
+        let seconds = |stage: Stage| {
+            self.nanoseconds[stage as usize].load(Ordering::Relaxed) as f64 * 1e-9 * frames_for_one
+        };
         let mut result = StageSeconds {
             broad_phase: seconds(Stage::BroadPhase),
             interaction: seconds(Stage::Interaction),
@@ -55,7 +107,7 @@ impl Clock {
             idle: 0.0,
         };
         let busy = result.broad_phase + result.interaction + result.update + result.render;
-        result.idle = (running.as_secs_f64() - busy).max(0.0);
+        result.idle = (all - busy).max(0.0);
         result
     }
 }
@@ -65,18 +117,50 @@ pub(super) struct Timer<'a> {
     clock: &'a Clock,
     stage: Stage,
     frame: u64,
-    began: Instant,
+    /// Nothing where the frame is not timed.
+    began: Option<Instant>,
 }
 
 impl Drop for Timer<'_> {
     fn drop(&mut self) {
+        let Some(began) = self.began else { return };
         let ended = Instant::now();
         let Clock { nanoseconds, track } = self.clock;
-        let took = ended - self.began;
+        let took = ended - began;
         // Relaxed: a count of its own, which nothing else depends on.
         nanoseconds[self.stage as usize].fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
         if let Some((timeline, worker)) = track.get() {
-            timeline.record(*worker, self.stage, self.frame, self.began, ended);
+            timeline.record(*worker, self.stage, self.frame, began, ended);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_that_are_not_timed_count_as_those_that_are() {
+        let (clock, mut running) = (Clock::default(), Running::new());
+        assert_eq!(clock.seconds(&running), StageSeconds::default());
+        clock.nanoseconds[Stage::Update as usize].store(500_000_000, Ordering::Relaxed);
+        drop(clock.time(Stage::Render, FRAMES_PER_SAMPLE + 1));
+        (running.all, running.timed) = (Duration::from_secs(20), Duration::from_secs(2));
+        let expected = StageSeconds { update: 5.0, idle: 15.0, ..StageSeconds::default() };
+        assert_eq!(clock.seconds(&running), expected);
+    }
+
+    #[test]
+    fn the_time_of_sampled_frames_is_known_apart() {
+        let mut running = Running::new();
+        running.begin();
+        for frame in 0..FRAMES_PER_SAMPLE {
+            running.swapped(frame);
+        }
+        assert!(running.timed < running.all);
+        let all = running.all;
+        running.watch();
+        running.swapped(1);
+        assert!(running.all > all && running.timed > running.all - all);
     }
 }

@@ -1,9 +1,8 @@
 //! The stages up to update as parallel loops.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
 
-use super::clock::{Clock, Stage, StageSeconds, Timer};
+use super::clock::{Clock, Running, Stage, StageSeconds, Timer};
 use super::mail::Mail;
 use super::parallel_for::ParallelFor;
 use super::world::{self, Candidates, Outbox, Outcome, World};
@@ -98,13 +97,13 @@ impl Engine {
 
     /// Computes the frame [`Self::frame`], which is then to be counted. `updated` is shown each block right
     /// after its update.
-    pub(super) fn compute(
+    pub(super) fn compute<P: ParallelFor>(
         &mut self,
-        loops: &impl ParallelFor,
+        loops: &P,
         updated: impl Fn(usize, &Block) + Sync + Send,
     ) -> PairCount {
         if self.world.regroups_before(self.frame) {
-            self.world.regroup();
+            self.world.regroup(P::IN_ORDER);
         }
         self.world.mail.turn();
         self.broad_phase(loops);
@@ -178,7 +177,7 @@ impl Engine {
         }
     }
 
-    pub(super) fn stage_seconds(&self, running: Duration) -> Vec<StageSeconds> {
+    pub(super) fn stage_seconds(&self, running: &Running) -> Vec<StageSeconds> {
         self.workers.iter().map(|worker| worker.clock.seconds(running)).collect()
     }
 }

@@ -1,9 +1,8 @@
 //! Stage after stage, each a parallel loop.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
-use super::clock::{Stage, StageSeconds};
+use super::clock::{Running, Stage, StageSeconds};
 use super::engine::Engine;
 use super::{Executor, ExecutorError, FrameRecord, OnFrame, world};
 use crate::blocking::Grain;
@@ -11,11 +10,14 @@ use crate::mailbox::Mailbox;
 use crate::object::Object;
 use crate::render::Renderer;
 use crate::scene::Scene;
-use crate::stages::Stages;
+use crate::stages::{PairCount, Stages};
 use crate::timeline::Timeline;
 
 /// Parallel loops on a fixed number of threads.
 pub trait ParallelFor: Sized + Send + Sync {
+    /// Whether threads take up items one by one in their order.
+    const IN_ORDER: bool = false;
+
     /// Loops on so many threads, at least 1.
     ///
     /// # Errors
@@ -41,11 +43,11 @@ pub trait ParallelFor: Sized + Send + Sync {
     );
 }
 
-/// Broad phase, interaction and update as a parallel loop each; then the calling thread renders.
+/// Broad phase, interaction and update as a parallel loop each; then one thread renders.
 pub struct LoopExecutor<P> {
     engine: Engine,
     loops: P,
-    running: Duration,
+    running: Running,
 }
 
 impl<P: ParallelFor> LoopExecutor<P> {
@@ -55,7 +57,7 @@ impl<P: ParallelFor> LoopExecutor<P> {
     /// No or too many threads, objects that cannot be grouped, or threads that cannot be had.
     pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
         let engine = Engine::new(scene, grain, threads)?;
-        Ok(Self { engine, loops: P::new(threads)?, running: Duration::ZERO })
+        Ok(Self { engine, loops: P::new(threads)?, running: Running::new() })
     }
 }
 
@@ -66,24 +68,22 @@ impl<P: ParallelFor> Executor for LoopExecutor<P> {
         renderer: &mut dyn Renderer,
         on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError> {
-        let began = Instant::now();
-        self.engine.world.outside.begin(self.engine.frame);
-        for _ in 0..frames {
-            let (engine, loops) = (&mut self.engine, &self.loops);
-            let frame = engine.frame;
-            let pairs = loops.enter(|| engine.compute(loops, |_, _| ()));
-            {
-                let _timer = self.engine.workers[0].clock.time(Stage::Render, frame);
-                for block in &self.engine.world.blocks {
-                    self.engine.world.stages.render(block, renderer);
-                }
-                renderer.swap(frame);
+        let Self { engine, loops, running } = self;
+        running.begin();
+        engine.world.outside.begin(engine.frame);
+        if renderer.is_bound() {
+            for _ in 0..frames {
+                let pairs = loops.enter(|| engine.compute(loops, |_, _| ()));
+                render(engine, pairs, running, renderer, on_frame);
             }
-            on_frame(&FrameRecord { frame, swapped: Instant::now(), pairs });
-            self.engine.world.outside.swapped(frame);
-            self.engine.frame += 1;
+        } else {
+            loops.enter(|| {
+                for _ in 0..frames {
+                    let pairs = engine.compute(loops, |_, _| ());
+                    render(engine, pairs, running, renderer, on_frame);
+                }
+            });
         }
-        self.running += began.elapsed();
         Ok(())
     }
 
@@ -108,10 +108,32 @@ impl<P: ParallelFor> Executor for LoopExecutor<P> {
     }
 
     fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.running.watch();
         self.engine.watch(&timeline);
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {
-        self.engine.stage_seconds(self.running)
+        self.engine.stage_seconds(&self.running)
     }
+}
+
+/// Renders the frame that was computed, and counts it.
+fn render(
+    engine: &mut Engine,
+    pairs: PairCount,
+    running: &mut Running,
+    renderer: &mut dyn Renderer,
+    on_frame: &mut OnFrame<'_>,
+) {
+    let frame = engine.frame;
+    {
+        let _timer = engine.workers[0].clock.time(Stage::Render, frame);
+        for block in &engine.world.blocks {
+            engine.world.stages.render(block, renderer);
+        }
+        renderer.swap(frame);
+    }
+    on_frame(&FrameRecord { frame, swapped: running.swapped(frame), pairs });
+    engine.world.outside.swapped(frame);
+    engine.frame += 1;
 }

@@ -6,9 +6,9 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::ExecutorError;
 use super::parallel_for::{LoopExecutor, ParallelFor};
 
-/// The stages up to update on a rayon pool of as many threads as asked for; the calling one, besides them,
-/// renders. Callbacks must not use rayon: a thread that waits in one for another may begin the next callback,
-/// and would then wait for itself.
+/// A rayon pool of as many threads as asked for; the calling one, besides them, waits for them, and renders if the
+/// renderer [is bound](crate::render::Renderer::is_bound) to it. Callbacks must not use rayon: a thread that waits in
+/// one for another may begin the next callback, and would then wait for itself.
 pub type RayonExecutor = LoopExecutor<RayonLoops>;
 
 /// Rayon's parallel iterators, on a pool of their own.
@@ -32,7 +32,8 @@ impl ParallelFor for RayonLoops {
     ) {
         let begin = || begin(rayon::current_thread_index().unwrap_or(0));
         let loops = || {
-            let items = items.par_iter_mut().enumerate();
+            // Items are few and uneven: without this, a thread may have several to do while the others wait.
+            let items = items.par_iter_mut().enumerate().with_max_len(1);
             items.for_each_init(begin, |state, (index, item)| body(state, index, item));
         };
         // Inside the pool this is a plain call.

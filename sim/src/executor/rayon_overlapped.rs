@@ -2,9 +2,8 @@
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
 
-use super::clock::{Clock, Stage, StageSeconds};
+use super::clock::{Clock, Running, Stage, StageSeconds};
 use super::engine::Engine;
 use super::parallel_for::ParallelFor;
 use super::rayon::RayonLoops;
@@ -19,9 +18,8 @@ use crate::stages::{PairCount, Stages, draw};
 use crate::timeline::Timeline;
 
 /// As [`RayonExecutor`], but every update also copies what a renderer sees, and the calling thread
-/// renders that copy while the pool computes the next frame: the best overlap of rendering that can
-/// be had without the pipeline. The calling thread is one more than the pool's. Callbacks must not use rayon,
-/// as there.
+/// renders that copy while the pool computes the next frame: rendering overlaps without the pipeline. The calling
+/// thread is one more than the pool's. Callbacks must not use rayon, as there.
 ///
 /// [`RayonExecutor`]: super::RayonExecutor
 pub struct RayonOverlappedExecutor {
@@ -32,7 +30,7 @@ pub struct RayonOverlappedExecutor {
     frame: u64,
     /// The calling thread's.
     clock: Clock,
-    running: Duration,
+    running: Running,
 }
 
 /// What a renderer sees of one frame, block by block. The locks are never contended.
@@ -52,7 +50,7 @@ impl RayonOverlappedExecutor {
         pictures.resize_with(PICTURES, || picture(&engine.world.blocks));
         let frame = engine.frame;
         let (loops, clock) = (RayonLoops::new(threads)?, Clock::default());
-        Ok(Self { engine, loops, pictures, frame, clock, running: Duration::ZERO })
+        Ok(Self { engine, loops, pictures, frame, clock, running: Running::new() })
     }
 }
 
@@ -63,7 +61,7 @@ impl Executor for RayonOverlappedExecutor {
         renderer: &mut dyn Renderer,
         on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError> {
-        let began = Instant::now();
+        self.running.begin();
         let (used, unused) = sync_channel(PICTURES);
         let (taken_in, taken_out) = sync_channel(PICTURES);
         // One that a panicking renderer held is gone.
@@ -84,7 +82,7 @@ impl Executor for RayonOverlappedExecutor {
                 show(&picture, renderer);
                 renderer.swap(frame);
                 drop(rendering);
-                on_frame(&FrameRecord { frame, swapped: Instant::now(), pairs });
+                on_frame(&FrameRecord { frame, swapped: self.running.swapped(frame), pairs });
                 // Before its picture is given back, without which the frame after next is not computed.
                 outside.swapped(frame);
                 self.frame = frame + 1;
@@ -97,7 +95,6 @@ impl Executor for RayonOverlappedExecutor {
             Ok(unused) => self.pictures.extend(unused),
             Err(panic) => std::panic::resume_unwind(panic),
         }
-        self.running += began.elapsed();
         Ok(())
     }
 
@@ -122,13 +119,14 @@ impl Executor for RayonOverlappedExecutor {
     }
 
     fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.running.watch();
         self.engine.watch(&timeline);
         self.clock.watch(timeline, self.engine.workers.len());
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {
-        let mut seconds = self.engine.stage_seconds(self.running);
-        seconds.push(self.clock.seconds(self.running));
+        let mut seconds = self.engine.stage_seconds(&self.running);
+        seconds.push(self.clock.seconds(&self.running));
         seconds
     }
 }

@@ -1,9 +1,8 @@
 //! One thread, stage after stage.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
-use super::clock::{Clock, Stage, StageSeconds};
+use super::clock::{Clock, Running, Stage, StageSeconds};
 use super::world::{self, Candidates, Outbox, Outcome, World};
 use super::{Executor, ExecutorError, FrameRecord, OnFrame};
 use crate::behavior::{Room, Workspace};
@@ -29,7 +28,7 @@ pub struct SerialExecutor {
     scratch: Scratch,
     workspace: Workspace,
     clock: Clock,
-    running: Duration,
+    running: Running,
     frame: u64,
 }
 
@@ -51,7 +50,7 @@ impl SerialExecutor {
             scratch: Scratch::new(),
             workspace: Workspace::with_room(Room::of(world.blocks.iter())),
             clock: Clock::default(),
-            running: Duration::ZERO,
+            running: Running::new(),
             frame,
             world,
         })
@@ -118,22 +117,22 @@ impl Executor for SerialExecutor {
         renderer: &mut dyn Renderer,
         on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError> {
-        let began = Instant::now();
+        self.running.begin();
         self.world.outside.begin(self.frame);
         for _ in 0..frames {
             if self.world.regroups_before(self.frame) {
-                self.world.regroup();
+                self.world.regroup(false);
             }
             self.world.mail.turn();
             self.broad_phase();
             let pairs = self.interact();
             self.update();
             self.render(renderer);
-            on_frame(&FrameRecord { frame: self.frame, swapped: Instant::now(), pairs });
+            let swapped = self.running.swapped(self.frame);
+            on_frame(&FrameRecord { frame: self.frame, swapped, pairs });
             self.world.outside.swapped(self.frame);
             self.frame += 1;
         }
-        self.running += began.elapsed();
         Ok(())
     }
 
@@ -158,10 +157,11 @@ impl Executor for SerialExecutor {
     }
 
     fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.running.watch();
         self.clock.watch(timeline, 0);
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {
-        vec![self.clock.seconds(self.running)]
+        vec![self.clock.seconds(&self.running)]
     }
 }

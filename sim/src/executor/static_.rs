@@ -4,10 +4,9 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
 
 use super::barrier::Barrier;
-use super::clock::{Clock, Stage, StageSeconds, Timer};
+use super::clock::{Clock, Running, Stage, StageSeconds, Timer};
 use super::engine::check_threads;
 use super::mail::Mail;
 use super::on_panic::OnPanic;
@@ -34,7 +33,7 @@ pub struct StaticExecutor {
     blocking: Blocking,
     own: Own,
     grain: Grain,
-    running: Duration,
+    running: Running,
     frame: u64,
 }
 
@@ -111,7 +110,7 @@ impl StaticExecutor {
             room,
         });
         let team = Team { threads: start(&shared, threads)?, shared: Arc::clone(&shared) };
-        let (blocking, running) = (world.blocking, Duration::ZERO);
+        let (blocking, running) = (world.blocking, Running::new());
         Ok(Self { team, shared, blocking, own: Own::new(room), grain, running, frame })
     }
 
@@ -296,7 +295,7 @@ impl Executor for StaticExecutor {
         renderer: &mut dyn Renderer,
         on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError> {
-        let began = Instant::now();
+        self.running.begin();
         self.shared.outside.begin(self.frame);
         for _ in 0..frames {
             self.prepare();
@@ -304,11 +303,11 @@ impl Executor for StaticExecutor {
             self.shared.compute(0, &mut self.own);
             let pairs = self.shared.finish();
             self.render(renderer);
-            on_frame(&FrameRecord { frame: self.frame, swapped: Instant::now(), pairs });
+            let swapped = self.running.swapped(self.frame);
+            on_frame(&FrameRecord { frame: self.frame, swapped, pairs });
             self.shared.outside.swapped(self.frame);
             self.frame += 1;
         }
-        self.running += began.elapsed();
         Ok(())
     }
 
@@ -349,13 +348,14 @@ impl Executor for StaticExecutor {
     }
 
     fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.running.watch();
         for (index, clock) in self.shared.clocks.iter().enumerate() {
             clock.watch(Arc::clone(&timeline), index);
         }
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {
-        self.shared.clocks.iter().map(|clock| clock.seconds(self.running)).collect()
+        self.shared.clocks.iter().map(|clock| clock.seconds(&self.running)).collect()
     }
 }
 

@@ -17,6 +17,14 @@ const NAMES: [[&str; 2]; 2] = [
     ["fig17-heavy-load", "fig17-heavy-load-rendering"],
 ];
 
+/// What is to be known of the others.
+const PEERS: &str = if cfg!(feature = "native-peers") {
+    "rayon-overlapped renders on a thread more than the axis says. "
+} else {
+    "rayon-overlapped renders on a thread more than the axis says; OpenMP and oneTBB were not built in (feature \
+     native-peers). "
+};
+
 /// Figs. 16 and 17.
 pub(super) fn particles(laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentError> {
     let Plan { seed, threads, compare, .. } = laboratory.plan;
@@ -91,7 +99,8 @@ impl Study<'_> {
         let mut all_rounds = Outcome::rounds_table(rounds);
         let mut figures = Vec::new();
         for (subject, names) in subjects {
-            let loads = [RenderLoad::Null, RenderLoad::StandIn(StandIn::calibrated(&subject)?)];
+            let stand_in = StandIn::calibrated(&subject, self.frames)?;
+            let loads = [RenderLoad::Null, RenderLoad::StandIn(stand_in)];
             for (load, name) in loads.into_iter().zip(names) {
                 let (subject, &Self { frames, rounds, .. }) = (subject.clone(), self);
                 let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };
@@ -128,7 +137,7 @@ impl Study<'_> {
             x_label: "threads",
             y_label: "speed-up S_s = T_s / T_p",
             x_counts: true,
-            finding: self.finding(outcome) + &self.note + &marked([outcome]),
+            finding: self.finding(outcome) + &self.note + PEERS + &marked([outcome]),
             paper: self.paper,
         }
         .lines(lines.collect())

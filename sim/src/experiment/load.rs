@@ -1,7 +1,7 @@
 //! What stands in for a graphics device while executors are compared.
 
 use super::error::ExperimentError;
-use super::race::{Race, Runner};
+use super::race::{Race, Runner, WARM_UP};
 use super::subject::Subject;
 use super::work::{spin, steps_per_second};
 use crate::object::Object;
@@ -9,10 +9,6 @@ use crate::render::{NullRenderer, Renderer};
 
 /// The share of a serial frame's work that the stand-in makes of rendering; usually 0.15.
 pub const RENDER_SHARE: f64 = 0.15;
-/// Frames from which the share is calibrated.
-const FRAMES: u64 = 60;
-/// Frames before them.
-const WARM_UP: u64 = 20;
 /// Runs from which the share is calibrated; the fastest counts.
 const RUNS: usize = 3;
 
@@ -53,14 +49,15 @@ pub struct StandIn {
 }
 
 impl StandIn {
-    /// A stand-in that makes rendering [`RENDER_SHARE`] of a subject's serial frame.
+    /// A stand-in that makes rendering [`RENDER_SHARE`] of a subject's serial frame, in the first `frames` after
+    /// [`WARM_UP`]: later ones may take longer or shorter.
     ///
     /// # Errors
     /// The environment cannot be built or run.
-    pub fn calibrated(subject: &Subject) -> Result<Self, ExperimentError> {
+    pub fn calibrated(subject: &Subject, frames: u64) -> Result<Self, ExperimentError> {
         let mut frame = f64::INFINITY;
         for _ in 0..RUNS {
-            frame = frame.min(serial_frame(subject)?);
+            frame = frame.min(serial_frame(subject, frames)?);
         }
         let spinning = frame * RENDER_SHARE / (1.0 - RENDER_SHARE) / subject.objects() as f64;
         Ok(Self { steps: (spinning * steps_per_second(spin)) as u64 })
@@ -76,10 +73,10 @@ impl Renderer for StandIn {
 }
 
 /// Seconds of a serial frame without rendering.
-fn serial_frame(subject: &Subject) -> Result<f64, ExperimentError> {
+fn serial_frame(subject: &Subject, frames: u64) -> Result<f64, ExperimentError> {
     let (subject, load) = (subject.clone(), RenderLoad::StandIn(StandIn { steps: 0 }));
-    let race = Race { subject, load, warm_up: WARM_UP, frames: FRAMES, rounds: 1 };
-    Ok(race.seconds(Runner::SERIAL)? / FRAMES as f64)
+    let race = Race { subject, load, warm_up: WARM_UP, frames, rounds: 1 };
+    Ok(race.seconds(Runner::SERIAL)? / frames as f64)
 }
 
 #[cfg(test)]
@@ -90,7 +87,7 @@ mod tests {
     #[test]
     fn a_calibrated_stand_in_works() {
         let subject = Subject::Particles(ParticleScene::new(5));
-        let stand_in = StandIn::calibrated(&subject).expect("a valid scene");
+        let stand_in = StandIn::calibrated(&subject, 5).expect("a valid scene");
         assert!(stand_in.steps > 0);
     }
 }

@@ -16,8 +16,8 @@ use crate::blocking::FRAMES_PER_BLOCKING;
 use crate::executor::{ExecutorKind, FrameRecord};
 use crate::manager::VeManager;
 
-/// Frames before the clock starts; usually 32: by then caches are warm, and blocks are formed anew by what the first
-/// frames took.
+/// Frames before the clock starts; usually 32: then caches are warm, and blocks are formed anew, for the first time
+/// with what updates take known to who goes by it.
 pub const WARM_UP: u64 = FRAMES_PER_BLOCKING;
 
 /// An executor that takes part.

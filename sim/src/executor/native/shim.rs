@@ -49,6 +49,8 @@ pub struct OpenMp<const DYNAMIC: bool> {
 }
 
 impl<const DYNAMIC: bool> ParallelFor for OpenMp<DYNAMIC> {
+    const IN_ORDER: bool = DYNAMIC;
+
     fn new(threads: usize) -> Result<Self, ExecutorError> {
         Ok(Self { threads: threads as c_int })
     }

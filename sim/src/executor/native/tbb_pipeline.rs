@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 use std::thread;
-use std::time::{Duration, Instant};
 
-use super::super::clock::{Stage, StageSeconds};
+use super::super::clock::{Running, Stage, StageSeconds};
 use super::super::engine::{Updating, Worker, check_threads};
 use super::super::parallel_for::ParallelFor;
 use super::super::world::{self, Candidates, Outcome, World};
@@ -40,7 +39,7 @@ pub struct TbbPipelineExecutor {
     candidates: Candidates,
     /// For each block the place of its first search result among the candidates.
     first_places: Vec<usize>,
-    running: Duration,
+    running: Running,
     frame: u64,
 }
 
@@ -67,7 +66,7 @@ impl TbbPipelineExecutor {
             searches: (0..blocks).map(|_| Search::new()).collect(),
             candidates: Candidates::new(blocks),
             first_places: Vec::with_capacity(blocks),
-            running: Duration::ZERO,
+            running: Running::new(),
             frame,
             world,
         })
@@ -75,7 +74,7 @@ impl TbbPipelineExecutor {
 
     fn prepare(&mut self) {
         if self.world.regroups_before(self.frame) {
-            self.world.regroup();
+            self.world.regroup(true);
         }
         self.world.mail.turn();
         self.bounds.clear();
@@ -172,17 +171,17 @@ impl Executor for TbbPipelineExecutor {
         renderer: &mut dyn Renderer,
         on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ExecutorError> {
-        let began = Instant::now();
+        self.running.begin();
         self.world.outside.begin(self.frame);
         for _ in 0..frames {
             self.prepare();
             let pairs = self.interact();
             self.update(renderer);
-            on_frame(&FrameRecord { frame: self.frame, swapped: Instant::now(), pairs });
+            let swapped = self.running.swapped(self.frame);
+            on_frame(&FrameRecord { frame: self.frame, swapped, pairs });
             self.world.outside.swapped(self.frame);
             self.frame += 1;
         }
-        self.running += began.elapsed();
         Ok(())
     }
 
@@ -207,12 +206,13 @@ impl Executor for TbbPipelineExecutor {
     }
 
     fn watch(&mut self, timeline: Arc<Timeline>) {
+        self.running.watch();
         for (index, worker) in self.workers.iter().enumerate() {
             worker.clock.watch(Arc::clone(&timeline), index);
         }
     }
 
     fn stage_seconds(&self) -> Vec<StageSeconds> {
-        self.workers.iter().map(|worker| worker.clock.seconds(self.running)).collect()
+        self.workers.iter().map(|worker| worker.clock.seconds(&self.running)).collect()
     }
 }

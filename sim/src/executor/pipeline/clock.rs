@@ -8,13 +8,8 @@ use dualframe_core::stage::Stage;
 use dualframe_core::unit::Work;
 
 use crate::executor::StageSeconds;
+use crate::executor::clock::is_sampled;
 use crate::timeline::Timeline;
-
-/// Of so many frames one is timed; usually 31. Reading the system's clock takes some 50 ns, and with one
-/// object a unit every work unit is a change of stage: timing every frame would cost more than
-/// synchronising it. A number without common divisors with the frames of a batch, so that its first
-/// ones are timed no more often than others.
-const FRAMES_PER_SAMPLE: u64 = 31;
 
 /// What a worker is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +22,7 @@ enum Doing {
 }
 
 /// What a worker spent its time on. Idle and busy time are measured, and how the busy time is shared out among
-/// the stages in one frame of [`FRAMES_PER_SAMPLE`]; in every frame if all are recorded on a timeline.
+/// the stages in frames that are sampled; in every frame if all are recorded on a timeline.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Times {
     stages: [Duration; 4],
@@ -129,7 +124,7 @@ impl Probe for StageClock<'_> {
     #[inline]
     fn begin(&mut self, work: Work, frame: Frame) {
         let frame = self.first_frame + u64::from(frame.0);
-        let timed = self.timeline.is_some() || frame.is_multiple_of(FRAMES_PER_SAMPLE);
+        let timed = self.timeline.is_some() || is_sampled(frame);
         self.turn_to(if timed { Doing::Timed(Stage::of(work), frame) } else { Doing::Untimed });
     }
 }
