@@ -98,7 +98,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             worker.hold(token).map_err(drop).expect("this pipeline's token");
         }
         while !pipeline.finished() {
-            worker.step(&Line).expect("tables for every pair");
+            // A panic would leave the other thread waiting for what this one had in hand.
+            worker.step(&Line).unwrap_or_else(|full| {
+                eprintln!("{full}");
+                std::process::exit(1)
+            });
         }
     };
     let token = pipeline.token(Vec::new()).map_err(|(_, full)| full)?;

@@ -16,8 +16,8 @@ use crate::ring::QueueSlot;
 use crate::sync::{seeded, site};
 
 /// The frame's arrivals. A cell holds a unit's index and, in its lowest bit, the parity of the frame
-/// that the unit arrived in: every unit arrives in every frame, so a cell that is not yet written in
-/// this frame was written in the one before, and is free.
+/// that the unit arrived in. As many arrive in every frame and nobody looks beyond the first free cell, so a cell that
+/// is looked at and not yet written in this frame was written in the one before, and is free.
 #[derive(Debug)]
 pub struct Arrivals<'m> {
     cells: &'m [QueueSlot],

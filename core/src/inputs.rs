@@ -52,7 +52,8 @@ impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
     }
 
     /// The unit's interactions of this frame that passed the broad phase, in pair order: by the
-    /// other unit's number, and by slot where two units have several.
+    /// other unit's number, and by slot where two units have several. They are sorted where they are:
+    /// what an iterator in any order has still to give is then skipped, or given again.
     pub fn interactions(
         &self,
     ) -> impl Iterator<Item = Interacted<'t, 'm, E::Interaction, E::Contact>> + use<'t, 'm, E> {

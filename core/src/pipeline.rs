@@ -121,7 +121,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
 
     fn no_token_left(&self) -> TableFull {
         let capacity = self.config.tokens as usize;
-        TableFull { table: Table::Tokens, capacity, needed: capacity + 1 }
+        TableFull { table: Table::Tokens, capacity, needed: capacity.saturating_add(1) }
     }
 
     /// Leaves `renderer` to all workers instead of giving tokens to some: whoever has updated a unit renders it too,

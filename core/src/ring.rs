@@ -99,7 +99,8 @@ impl<'m> IndexRing<'m> {
         self.cycle(word).wrapping_sub(self.cycle(position)) & (usize::MAX >> self.slot_bits)
     }
 
-    /// Appends `index`, which must not be in the ring.
+    /// Appends `index`, which must not be in the ring: there would be more than the ring holds, others would be
+    /// lost, and `pop` might never return.
     ///
     /// # Errors
     /// [`TableFull`] if `index` is not below the number of slots: caught before it can be mistaken

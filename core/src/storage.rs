@@ -50,10 +50,14 @@ impl<O> UnitSlot<O> {
         }
     }
 
-    /// A unit that never interacts with others: it bypasses the first two stages (§5.1). Under
-    /// modelled interactions every unit without any does, whether made so or not.
-    pub fn solitary(object: O) -> Self {
-        Self { solitary: true, ..Self::new(object) }
+    const_fn! {
+        /// A unit that never interacts with others: it bypasses the first two stages (§5.1). Under
+        /// modelled interactions every unit without any does, whether made so or not.
+        pub const fn solitary(object: O) -> Self {
+            let mut slot = Self::new(object);
+            slot.solitary = true;
+            slot
+        }
     }
 
     /// The object.

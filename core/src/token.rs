@@ -10,7 +10,7 @@ use crate::sync::{Atomic, CachePadded, Cell, const_fn, seeded, site};
 /// worker to worker, and the renderer moves along.
 #[derive(Debug)]
 pub struct Token<'p, R> {
-    pub(crate) renderer: R,
+    renderer: R,
     permit: Permit<'p>,
 }
 

@@ -45,7 +45,7 @@ impl<W: Waiting + ?Sized> Waiting for &W {
 pub struct Epoch(u32);
 
 /// What sleeping workers listen to. Token holders have their own, so that a call to render never
-/// wakes a worker that cannot.
+/// wakes a worker that cannot. (A shared renderer is anybody's: who is called for it may find it taken.)
 #[derive(Debug)]
 pub struct Bell {
     epoch: CachePadded<Atomic>,
