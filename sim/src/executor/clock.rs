@@ -19,7 +19,8 @@ pub(super) fn is_sampled(frame: u64) -> bool {
     frame.is_multiple_of(FRAMES_PER_SAMPLE)
 }
 
-/// Seconds that one worker spent in each stage.
+/// Seconds that one worker spent in each stage, shared out as in the frames that were timed: one of 31, or all that a
+/// timeline records.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageSeconds {
     /// In the broad phase.
