@@ -21,7 +21,7 @@ fn tiny() -> Plan {
         seed: 3,
         threads: vec![1, 2],
         scalability: sweep(&[3, 6], 2),
-        load_balance: sweep(&[4, 500], 1),
+        load_balance: sweep(&[4, 500], 2),
         per_frame: sweep(&[5], 2),
         compare: sweep(&[3, 5], 2),
         retraction: Retraction { threads: vec![1, 2], keeps_core: true, frames: 2, rounds: 1 },
@@ -96,9 +96,12 @@ fn a_plan_that_lacks_something() {
         Plan { per_frame: sweep(&plan.per_frame, &[5, 6]), ..tiny() },
         Plan { per_frame: Sweep { rounds: 0, ..plan.per_frame.clone() }, ..tiny() },
         Plan { compare: sweep(&plan.compare, &[3]), ..tiny() },
+        Plan { load_balance: Sweep { rounds: 0, ..plan.load_balance.clone() }, ..tiny() },
+        Plan { threads: vec![], ..tiny() },
+        Plan { threads: vec![2], ..tiny() },
     ];
     for plan in wrong {
-        let experiments = [Experiment::PerFrame, Experiment::Compare];
+        let experiments = [Experiment::LoadBalance, Experiment::PerFrame, Experiment::Compare];
         let error = run(&experiments, &plan, out.path(), &mut |_, _| ()).err();
         assert!(matches!(error, Some(ExperimentError::Plan { .. })), "{plan:?}: {error:?}");
     }

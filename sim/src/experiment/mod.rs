@@ -41,7 +41,7 @@ use self::error::ExperimentError;
 use self::figure::Figure;
 use self::machine::Machine;
 use self::outcome::Outcome;
-use self::plan::{Plan, Sweep};
+use self::plan::Plan;
 use self::race::{OnFrame, Race, Runner, WARM_UP};
 use self::table::Table;
 
@@ -99,15 +99,22 @@ impl Experiment {
 
     /// Whether a plan has what it takes.
     fn check(self, plan: &Plan) -> Result<(), ExperimentError> {
-        let (is_right, takes) = match self {
-            Self::PerFrame => {
-                let Sweep { objects, rounds, .. } = &plan.per_frame;
-                (objects.len() == 1 && *rounds > 0, "one number of objects, and a round")
-            }
-            Self::Compare => (plan.compare.objects.len() == 2, "two numbers of objects"),
-            _ => (true, ""),
+        let Plan { threads, scalability, load_balance, per_frame, compare, retraction, .. } = plan;
+        let (threads, rounds) = match self {
+            Self::Scalability => (threads, scalability.rounds),
+            Self::LoadBalance => (threads, load_balance.rounds),
+            Self::PerFrame => (threads, per_frame.rounds),
+            Self::Compare => (threads, compare.rounds),
+            Self::Retraction => (&retraction.threads, retraction.rounds),
         };
-        if is_right { Ok(()) } else { Err(ExperimentError::Plan { experiment: self, takes }) }
+        let takes = match self {
+            _ if threads.first() != Some(&1) => "numbers of threads, from 1 upwards",
+            _ if rounds == 0 => "a round",
+            Self::PerFrame if per_frame.objects.len() != 1 => "one number of objects",
+            Self::Compare if compare.objects.len() != 2 => "two numbers of objects",
+            _ => return Ok(()),
+        };
+        Err(ExperimentError::Plan { experiment: self, takes })
     }
 
     fn run(self, laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentError> {

@@ -79,7 +79,7 @@ impl Plan {
             seed: 1,
             threads: (1..=cores().min(MAX_THREADS)).collect(),
             scalability: Sweep { objects: hundreds.clone(), frames: 800, rounds: 7 },
-            load_balance: Sweep { objects: hundreds, frames: 800, rounds: 1 },
+            load_balance: Sweep { objects: hundreds, frames: 800, rounds: 7 },
             per_frame: Sweep { objects: vec![300], frames: 600, rounds: 15 },
             compare: Sweep { objects: vec![100, 1_000], frames: 400, rounds: 15 },
             retraction: Retraction::on(cores(), 1_000, 7),
@@ -91,7 +91,7 @@ impl Plan {
     pub fn quick() -> Self {
         Self {
             scalability: Sweep { objects: vec![100, 400, 700, 1_000], frames: 100, rounds: 5 },
-            load_balance: Sweep { objects: vec![100, 500, 1_000], frames: 200, rounds: 1 },
+            load_balance: Sweep { objects: vec![100, 500, 1_000], frames: 200, rounds: 3 },
             per_frame: Sweep { objects: vec![300], frames: 600, rounds: 5 },
             compare: Sweep { objects: vec![100, 1_000], frames: 100, rounds: 5 },
             retraction: Retraction::on(cores(), 100, 3),
