@@ -29,6 +29,11 @@ pub trait ParallelFor: Sized + Send + Sync {
         work()
     }
 
+    /// The number of the thread that calls; 0 for one that has none.
+    fn worker(&self) -> usize {
+        0
+    }
+
     /// Calls `body` with every item and its place, once. A thread that takes up some items calls
     /// `begin` first, with its number, below the number of threads; what it gives is kept until the
     /// thread has done them. A number belongs to one thread at a time.
@@ -74,13 +79,13 @@ impl<P: ParallelFor> Executor for LoopExecutor<P> {
         if renderer.is_bound() {
             for _ in 0..frames {
                 let pairs = loops.enter(|| engine.compute(loops, |_, _| ()));
-                render(engine, pairs, running, renderer, on_frame);
+                render(engine, loops.worker(), pairs, running, renderer, on_frame);
             }
         } else {
             loops.enter(|| {
                 for _ in 0..frames {
                     let pairs = engine.compute(loops, |_, _| ());
-                    render(engine, pairs, running, renderer, on_frame);
+                    render(engine, loops.worker(), pairs, running, renderer, on_frame);
                 }
             });
         }
@@ -117,9 +122,10 @@ impl<P: ParallelFor> Executor for LoopExecutor<P> {
     }
 }
 
-/// Renders the frame that was computed, and counts it.
+/// Renders the frame that was computed, as this worker, and counts it.
 fn render(
     engine: &mut Engine,
+    worker: usize,
     pairs: PairCount,
     running: &mut Running,
     renderer: &mut dyn Renderer,
@@ -127,7 +133,7 @@ fn render(
 ) {
     let frame = engine.frame;
     {
-        let _timer = engine.workers[0].clock.time(Stage::Render, frame);
+        let _timer = engine.workers[worker].clock.time(Stage::Render, frame);
         for block in &engine.world.blocks {
             engine.world.stages.render(block, renderer);
         }

@@ -24,6 +24,10 @@ impl ParallelFor for RayonLoops {
         self.0.install(work)
     }
 
+    fn worker(&self) -> usize {
+        self.0.current_thread_index().unwrap_or(0)
+    }
+
     fn for_each<T: Send, S>(
         &self,
         items: &mut [T],
