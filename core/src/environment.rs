@@ -28,14 +28,14 @@ pub struct Pair {
 /// A callback that returns an error ends its work unit like one that succeeds: the frame goes on
 /// and the error comes out of [`crate::worker::Worker::step`].
 ///
+/// The environment itself need not be `Sync`: each worker may step with a value of its own, which
+/// can hold scratch memory.
+///
 /// # Panics
 /// A callback that panics unwinds through `step`, and its work unit is lost: the pipeline stops, soundly, and never
 /// finishes; who waits for it waits for good, and no other batch can be run. A host that must go on catches panics in
 /// its callbacks, and sees to it that nothing else of its own panics: [`crate::wait::Waiting`], probes, the conversion
 /// into [`Self::Error`], and what drops a message.
-///
-/// The environment itself need not be `Sync`: each worker may step with a value of its own, which
-/// can hold scratch memory.
 pub trait Environment {
     /// What a unit holds: one object, or a block of objects.
     type Object: Send + Sync;

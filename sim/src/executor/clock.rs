@@ -42,17 +42,11 @@ pub(super) struct Running {
     last: Instant,
     all: Duration,
     timed: Duration,
-    is_watched: bool,
 }
 
 impl Running {
     pub(super) fn new() -> Self {
-        Self { last: Instant::now(), all: Duration::ZERO, timed: Duration::ZERO, is_watched: false }
-    }
-
-    /// Every frame is timed from now on: clocks are to record all of them.
-    pub(super) fn watch(&mut self) {
-        self.is_watched = true;
+        Self { last: Instant::now(), all: Duration::ZERO, timed: Duration::ZERO }
     }
 
     /// The next frame begins now.
@@ -60,12 +54,13 @@ impl Running {
         self.last = Instant::now();
     }
 
-    /// The frame `frame` is swapped, at the time that this says, when the next one begins.
-    pub(super) fn swapped(&mut self, frame: u64) -> Instant {
+    /// The frame `frame`, which this clock as all others may have timed, is swapped, at the time that this says, when
+    /// the next one begins.
+    pub(super) fn swapped(&mut self, frame: u64, clock: &Clock) -> Instant {
         let now = Instant::now();
         let took = now - std::mem::replace(&mut self.last, now);
         self.all += took;
-        if self.is_watched || is_sampled(frame) {
+        if clock.times(frame) {
             self.timed += took;
         }
         now
@@ -87,10 +82,13 @@ impl Clock {
         self.track.get_or_init(|| (timeline, worker));
     }
 
+    fn times(&self, frame: u64) -> bool {
+        is_sampled(frame) || self.track.get().is_some()
+    }
+
     /// Counts the time until the guard is dropped towards a stage, which works on `frame`, if that is timed.
     pub(super) fn time(&self, stage: Stage, frame: u64) -> Timer<'_> {
-        let is_timed = is_sampled(frame) || self.track.get().is_some();
-        Timer { clock: self, stage, frame, began: is_timed.then(Instant::now) }
+        Timer { clock: self, stage, frame, began: self.times(frame).then(Instant::now) }
     }
 
     /// What was counted, as if all frames had been like those that were timed; all is idle before the first of them.
@@ -155,16 +153,16 @@ mod tests {
 
     #[test]
     fn the_time_of_sampled_frames_is_known_apart() {
-        let mut running = Running::new();
+        let (clock, mut running) = (Clock::default(), Running::new());
         let frame = |running: &mut Running, frame| {
             thread::sleep(Duration::from_micros(1));
-            running.swapped(frame);
+            running.swapped(frame, &clock);
         };
         running.begin();
         (0..FRAMES_PER_SAMPLE).for_each(|number| frame(&mut running, number));
         assert!(running.timed < running.all);
         let all = running.all;
-        running.watch();
+        clock.watch(Arc::new(Timeline::new(1, 1)), 0);
         frame(&mut running, 1);
         assert!(running.all > all && running.timed > running.all - all);
     }

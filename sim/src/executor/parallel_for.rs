@@ -15,7 +15,7 @@ use crate::timeline::Timeline;
 
 /// Parallel loops on a fixed number of threads.
 pub trait ParallelFor: Sized + Send + Sync {
-    /// Whether threads take up items one by one in their order.
+    /// Whether threads take up items one by one in their order: those that take longest had better come first then.
     const IN_ORDER: bool = false;
 
     /// Loops on so many threads, at least 1.
@@ -113,7 +113,6 @@ impl<P: ParallelFor> Executor for LoopExecutor<P> {
     }
 
     fn watch(&mut self, timeline: Arc<Timeline>) {
-        self.running.watch();
         self.engine.watch(&timeline);
     }
 
@@ -132,14 +131,15 @@ fn render(
     on_frame: &mut OnFrame<'_>,
 ) {
     let frame = engine.frame;
+    let clock = &engine.workers[worker].clock;
     {
-        let _timer = engine.workers[worker].clock.time(Stage::Render, frame);
+        let _timer = clock.time(Stage::Render, frame);
         for block in &engine.world.blocks {
             engine.world.stages.render(block, renderer);
         }
         renderer.swap(frame);
     }
-    on_frame(&FrameRecord { frame, swapped: running.swapped(frame), pairs });
+    on_frame(&FrameRecord { frame, swapped: running.swapped(frame, clock), pairs });
     engine.world.outside.swapped(frame);
     engine.frame += 1;
 }

@@ -82,7 +82,8 @@ impl Executor for RayonOverlappedExecutor {
                 show(&picture, renderer);
                 renderer.swap(frame);
                 drop(rendering);
-                on_frame(&FrameRecord { frame, swapped: self.running.swapped(frame), pairs });
+                let swapped = self.running.swapped(frame, &self.clock);
+                on_frame(&FrameRecord { frame, swapped, pairs });
                 // Before its picture is given back, without which the frame after next is not computed.
                 outside.swapped(frame);
                 self.frame = frame + 1;
@@ -119,7 +120,6 @@ impl Executor for RayonOverlappedExecutor {
     }
 
     fn watch(&mut self, timeline: Arc<Timeline>) {
-        self.running.watch();
         self.engine.watch(&timeline);
         self.clock.watch(timeline, self.engine.workers.len());
     }

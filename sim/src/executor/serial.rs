@@ -128,7 +128,7 @@ impl Executor for SerialExecutor {
             let pairs = self.interact();
             self.update();
             self.render(renderer);
-            let swapped = self.running.swapped(self.frame);
+            let swapped = self.running.swapped(self.frame, &self.clock);
             on_frame(&FrameRecord { frame: self.frame, swapped, pairs });
             self.world.outside.swapped(self.frame);
             self.frame += 1;
@@ -157,7 +157,6 @@ impl Executor for SerialExecutor {
     }
 
     fn watch(&mut self, timeline: Arc<Timeline>) {
-        self.running.watch();
         self.clock.watch(timeline, 0);
     }
 

@@ -303,7 +303,7 @@ impl Executor for StaticExecutor {
             self.shared.compute(0, &mut self.own);
             let pairs = self.shared.finish();
             self.render(renderer);
-            let swapped = self.running.swapped(self.frame);
+            let swapped = self.running.swapped(self.frame, &self.shared.clocks[0]);
             on_frame(&FrameRecord { frame: self.frame, swapped, pairs });
             self.shared.outside.swapped(self.frame);
             self.frame += 1;
@@ -348,7 +348,6 @@ impl Executor for StaticExecutor {
     }
 
     fn watch(&mut self, timeline: Arc<Timeline>) {
-        self.running.watch();
         for (index, clock) in self.shared.clocks.iter().enumerate() {
             clock.watch(Arc::clone(&timeline), index);
         }

@@ -177,7 +177,7 @@ impl Executor for TbbPipelineExecutor {
             self.prepare();
             let pairs = self.interact();
             self.update(renderer);
-            let swapped = self.running.swapped(self.frame);
+            let swapped = self.running.swapped(self.frame, &self.workers[0].clock);
             on_frame(&FrameRecord { frame: self.frame, swapped, pairs });
             self.world.outside.swapped(self.frame);
             self.frame += 1;
@@ -206,7 +206,6 @@ impl Executor for TbbPipelineExecutor {
     }
 
     fn watch(&mut self, timeline: Arc<Timeline>) {
-        self.running.watch();
         for (index, worker) in self.workers.iter().enumerate() {
             worker.clock.watch(Arc::clone(&timeline), index);
         }
