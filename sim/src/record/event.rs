@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::flaw::Disorder;
 use super::wire::{Decoder, Encoder, Malformed};
-use super::{MAX_LETTERS, MAX_PAYLOAD, message};
+use super::{CHECKPOINT_FRAMES, MAX_LETTERS, MAX_PAYLOAD, message};
 use crate::manager::VeManager;
 use crate::message::{Custom, Message};
 use crate::object::ObjectId;
@@ -149,6 +149,8 @@ pub(super) struct Order {
     stop: u64,
     /// Bytes of the stops before that frame.
     stop_bytes: usize,
+    /// The frame before which the last checkpoint was.
+    checkpoint: Option<u64>,
 }
 
 impl Order {
@@ -185,13 +187,16 @@ impl Order {
         }
     }
 
-    /// Something of so many bytes is noted before a frame.
-    pub(super) fn stop(&mut self, frame: u64, bytes: usize) -> Result<(), Disorder> {
+    /// Something that takes so many bytes is noted before a frame.
+    pub(super) fn stop(&mut self, frame: u64, stop: &Stop, bytes: usize) -> Result<(), Disorder> {
         if frame < self.stop.max(self.due.saturating_sub(1)) {
             return Err(Disorder::Stop { frame, after: self.stop, due: self.due });
         }
         self.stop_bytes = if frame == self.stop { self.stop_bytes + bytes } else { bytes };
         self.stop = frame;
+        if matches!(stop, Stop::Checkpoint(_)) {
+            self.checkpoint = Some(frame);
+        }
         match self.stop_bytes <= MAX_PAYLOAD {
             true => Ok(()),
             false => Err(Disorder::Stops { frame }),
@@ -204,6 +209,10 @@ impl Order {
         if frames < least {
             return Err(Disorder::Frames { frames, least });
         }
+        // So that a file can promise no more frames than it has checkpoints for.
+        if frames - self.checkpoint.unwrap_or(0) > CHECKPOINT_FRAMES {
+            return Err(self.unchecked(frames));
+        }
         self.frames = frames;
         if self.due < frames {
             (self.due, self.letters) = (frames, 0);
@@ -212,6 +221,18 @@ impl Order {
             (self.stop, self.stop_bytes) = (frames, 0);
         }
         Ok(())
+    }
+
+    /// The recording is over.
+    pub(super) fn end(&self) -> Result<(), Disorder> {
+        match self.checkpoint == Some(self.frames) {
+            true => Ok(()),
+            false => Err(self.unchecked(self.frames)),
+        }
+    }
+
+    fn unchecked(&self, frames: u64) -> Disorder {
+        Disorder::Unchecked { frames, checked: self.checkpoint }
     }
 }
 

@@ -97,6 +97,18 @@ pub enum Disorder {
         /// The least that it can be.
         least: u64,
     },
+    /// More frames than a checkpoint apart are not checked, or the last ones are not.
+    #[error("of {frames} frames the last checkpoint is {}", told(.checked))]
+    Unchecked {
+        /// The number of frames.
+        frames: u64,
+        /// Those before the last checkpoint, if there is one.
+        checked: Option<u64>,
+    },
+}
+
+fn told(checked: &Option<u64>) -> String {
+    checked.map_or("missing".to_owned(), |frames| format!("after {frames}"))
 }
 
 /// What is wrong with a recording, and where.

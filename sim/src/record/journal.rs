@@ -52,7 +52,7 @@ impl Journal {
         self.note(frame, |journal| {
             let before = journal.payload.len();
             stop.encode(journal.order.later(frame), &mut Encoder(&mut journal.payload));
-            journal.order.stop(frame, journal.payload.len() - before)?;
+            journal.order.stop(frame, stop, journal.payload.len() - before)?;
             journal.totals.stop(stop);
             Ok(())
         });

@@ -105,7 +105,7 @@ impl<R: Read> Reader<R> {
                 self.totals.letters += 1;
             }
             Event::Stop { frame, stop } => {
-                self.order.stop(*frame, place - self.place)?;
+                self.order.stop(*frame, stop, place - self.place)?;
                 self.totals.stop(stop);
             }
         }
@@ -119,6 +119,7 @@ impl<R: Read> Reader<R> {
         if told != found {
             return Err(Flaw::Totals { told: Box::new(told), found: Box::new(found) });
         }
+        self.order.end()?;
         self.chunks.finish()
     }
 }

@@ -17,8 +17,8 @@ use crate::object::ObjectId;
 use crate::render::Renderer;
 use crate::state::object_hash;
 
-/// How long what was recorded may wait to be written, looked at every [`CHECKPOINT_FRAMES`]; usually 1 s. A crash costs
-/// the longer of both.
+/// How long what was recorded may wait to be written; usually 1 s. It is looked at after every run and every
+/// [`CHECKPOINT_FRAMES`] of it: a crash costs so much more.
 const MOST_WAITING: Duration = Duration::from_secs(1);
 /// Bytes that are written at once even if they have not waited; usually 256 KiB.
 const MANY_BYTES: usize = 1 << 18;
@@ -73,7 +73,8 @@ impl<W: Write> Recorder<W> {
     /// [`CHECKPOINT_FRAMES`], and writes what was recorded.
     ///
     /// # Errors
-    /// The executor cannot go on, or what was recorded cannot be written. Frames may be left to do then:
+    /// The executor cannot go on, or what was recorded cannot be written, or frames were run without the recorder, by
+    /// more than a checkpoint is from the next. Frames may be left to do then:
     /// [`VeManager::frame`] says how far it came.
     pub fn run(
         &mut self,

@@ -176,15 +176,45 @@ fn what_is_not_in_order() {
     );
     assert_eq!(disorder(3, &[(LETTER, 5, RELEASE)]), Disorder::Frames { frames: 3, least: 4 });
     // The next chunk's events come later by so much, but it ends when it did.
-    assert_eq!(disorder(80, &[]), Disorder::Frames { frames: 70, least: 80 + 70 });
+    assert_eq!(disorder(60, &[]), Disorder::Frames { frames: 70, least: 60 + 70 });
     let twice: &[(u8, u64, &[u8])] = &[(LETTER, u64::MAX, RELEASE), (LETTER, 1, RELEASE)];
-    for overflow in [read(u64::MAX, &[]), read(9, twice)] {
-        assert!(matches!(overflow, Err(Flaw::Malformed(Malformed::Value { what: "a frame", .. }))));
-    }
+    let overflow = read(9, twice);
+    assert!(matches!(overflow, Err(Flaw::Malformed(Malformed::Value { what: "a frame", .. }))));
     let kind = read(9, &[(9, 0, &[])]);
     assert!(matches!(kind, Err(Flaw::Malformed(Malformed::Value { .. }))));
     let ended = read(9, &[(OBJECTS, 0, &[0xff, 0xff, 3, 0])]);
     assert!(matches!(ended, Err(Flaw::Malformed(Malformed::Ended))));
+}
+
+#[test]
+fn frames_that_nothing_checks() {
+    let file = session();
+    let unchecked = |file: &[u8]| {
+        let mut reader = Reader::new(file).expect("a header");
+        match reader.find_map(Result::err).map(|error| error.flaw) {
+            Some(Flaw::Disorder(Disorder::Unchecked { frames, checked })) => (frames, checked),
+            other => panic!("{other:?}"),
+        }
+    };
+    // Up to this frame there is the checkpoint of the first chunk, or none.
+    let promising = |frames: u64, is_checked: bool| {
+        let chunks = rewritten(&file, |chunk, payload| match chunk {
+            1 if !is_checked => payload.truncate(FRAMES),
+            2 => *payload = frames.to_le_bytes().to_vec(),
+            3 => {
+                payload.clear();
+                let checkpoints = u64::from(is_checked);
+                Totals { frames, checkpoints, ..Totals::default() }.encode(&mut Encoder(payload));
+            }
+            _ => {}
+        });
+        unchecked(&chunks)
+    };
+    for frames in [1, CHECKPOINT_FRAMES, CHECKPOINT_FRAMES + 1, 1 << 63, u64::MAX] {
+        assert_eq!(promising(frames, true), (frames, Some(0)));
+        assert_eq!(promising(frames, false), (frames, None));
+    }
+    assert_eq!(promising(0, false), (0, None));
 }
 
 #[test]

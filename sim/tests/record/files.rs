@@ -128,7 +128,7 @@ fn files_that_another_program_has_written() {
     };
     let (events, error) = seed("all.rec");
     assert!(error.is_none(), "{error:?}");
-    assert_eq!(events.len(), 9 + 3 + 2);
+    assert_eq!(events.len(), 9 + 3 + 2 + 1);
     assert_eq!(
         events[5],
         "Letter { due: 2, to: ObjectId(0), message: Stiffness { between_nodes: 60.0, to_center: 300.0 } }"
@@ -136,7 +136,7 @@ fn files_that_another_program_has_written() {
     assert_eq!(events[13], "Stop { frame: 27, stop: Objects([115, 112, 101, 99]) }");
     let (events, error) = seed("packed.rec");
     assert!(error.is_none(), "{error:?}");
-    assert_eq!(events.len(), 90);
+    assert_eq!(events.len(), 90 + 2);
     let (events, error) = seed("cut.rec");
     assert_eq!(events.len(), 2);
     let error = error.expect("it is cut").to_string();
