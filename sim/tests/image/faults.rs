@@ -283,6 +283,11 @@ fn nrrd_fields() {
     refused_nrrd("modality", "Type: int", twice);
     let units = "units is \"\\\"inch\\\"\": it must be m, cm, mm or um";
     refused_nrrd("modality", "space units: \"inch\"", units);
+    for bare in ["um um um", "um \"mm\" \"mm\"", "\"um\" \"um\" \"um"] {
+        let expected =
+            format!("units is {bare:?}: it must be in quotation marks, one for each axis");
+        refused_nrrd("modality", &format!("space units: {bare}"), &expected);
+    }
     refused_nrrd("modality", "byte skip: 4", "byte or line skip is \"4\": it must be 0");
 }
 

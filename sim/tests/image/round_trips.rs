@@ -160,6 +160,10 @@ fn saved() {
         let packed = std::fs::read(&path).expect("it was just written").starts_with(&[0x1f, 0x8b]);
         assert_eq!(packed, name.ends_with(".gz"), "{name}");
     }
+    // None longer can stand beside it.
+    let path = folder.path().join("v".repeat(251) + ".nii");
+    save(&path, image.grid(), image.voxels()).expect("the folder takes it");
+    assert_eq!(Image::open(&path).expect("it was just written"), image);
 }
 
 /// Where no file may be longer than a few kilobytes, as on a full disk, the image that was there stays; run by

@@ -43,11 +43,13 @@ voxel!(u16, 512);
 
 /// Writes a volume to a file, packed by gzip if its name ends in `.gz`; as [`write()`].
 ///
-/// It is written beside the file and takes its place when it is whole, so that a full disk leaves what was there. A
-/// device or a pipe is written as it is.
+/// It is written beside the file and takes its place when it is whole, so that a full disk leaves what was there. Where
+/// nothing can be put beside it (the folder is another's, the name is too long for more), and where it is a device or a
+/// pipe, it is written as it is.
 ///
 /// # Errors
-/// As [`write()`], or the file, or one beside it, cannot be created.
+/// As [`write()`], or the file cannot be created. What is whole, but can neither take the file's place nor be copied
+/// there, is left beside it.
 pub fn save<V: Voxel>(path: &Path, grid: &Grid, voxels: &[V]) -> Result<(), FileError> {
     let packs = path.extension().is_some_and(|extension| extension == "gz");
     let save = || {
@@ -58,20 +60,30 @@ pub fn save<V: Voxel>(path: &Path, grid: &Grid, voxels: &[V]) -> Result<(), File
         }
         // A link stays one.
         let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-        let (file, beside) = create_beside(&place)?;
+        let (file, beside) = match create_beside(&place) {
+            Err(error) if !is_full(&error) => {
+                return fill(&File::create(place)?, packs, grid, voxels);
+            }
+            created => created?,
+        };
         let written = (|| {
             if let Ok(there) = there {
                 file.set_permissions(there.permissions())?;
             }
             fill(&file, packs, grid, voxels)?;
-            file.sync_all()?;
-            Ok(fs::rename(&beside, &place)?)
+            Ok(file.sync_all()?)
         })();
         if written.is_err() {
             // What the disk had no room for; why is told already.
             let _ = fs::remove_file(&beside);
+            return written;
         }
-        written
+        // Nothing takes the place of a file that is mounted alone.
+        if fs::rename(&beside, &place).is_err() {
+            fs::copy(&beside, &place)?;
+            fs::remove_file(&beside)?;
+        }
+        Ok(())
     };
     save().map_err(|source| FileError { path: path.to_owned(), source })
 }
@@ -88,6 +100,11 @@ fn create_beside(place: &Path) -> io::Result<(File, PathBuf)> {
         }
     }
     Err(ErrorKind::AlreadyExists.into())
+}
+
+/// Whether there was no room: then what is there must not be emptied.
+fn is_full(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded)
 }
 
 fn fill<V: Voxel>(file: &File, packs: bool, grid: &Grid, voxels: &[V]) -> Result<(), ImageError> {

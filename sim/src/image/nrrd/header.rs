@@ -166,6 +166,11 @@ fn signs(space: &str) -> Result<DVec3, ImageError> {
 fn metres_per_unit(units: Option<&str>) -> Result<f64, ImageError> {
     let units = units.unwrap_or_default();
     // Each stands in quotation marks, empty ones for axes that are not in space.
+    let marks = units.matches('"').count();
+    let bare = units.split('"').step_by(2);
+    if marks % 2 == 1 || bare.flat_map(str::chars).any(|letter| !letter.is_whitespace()) {
+        return Err(ImageError::field("units", units, "in quotation marks, one for each axis"));
+    }
     let mut names = units.split('"').skip(1).step_by(2).filter(|name| !name.is_empty());
     let first = names.next().unwrap_or("mm");
     let metres = match first {
