@@ -75,7 +75,7 @@ fn all_experiments() {
         assert!(!page.contains(outside), "{outside}: the page needs nothing else");
     }
     assert!(page.contains("seed 3") && page.contains("Table 1"));
-    assert!(page.contains("One core is kept for haptics."));
+    assert!(page.contains("One core is kept for haptics. Only the first 34 of the "));
 }
 
 #[test]
@@ -83,6 +83,19 @@ fn a_folder_that_is_not_there() {
     let out = std::path::Path::new("/no/such/folder");
     let error = run(&[Experiment::PerFrame], &tiny(), out, &mut |_, _| ()).err();
     assert!(error.is_some_and(|error| error.to_string().contains("/no/such/folder")));
+}
+
+#[test]
+fn a_file_that_cannot_be_written_costs_no_other() {
+    let out = tempfile::tempdir().expect("a temporary folder");
+    // A folder stands in its place.
+    fs::create_dir(out.path().join("fig15-collisions.svg")).expect("a folder");
+    let experiments = [Experiment::PerFrame, Experiment::Compare];
+    let error = run(&experiments, &tiny(), out.path(), &mut |_, _| ()).err();
+    assert!(error.is_some_and(|error| error.to_string().contains("fig15-collisions.svg")));
+    for name in ["fig15-collisions.png", "fig15-speed-up.svg", "compare.csv", PAGE] {
+        assert!(out.path().join(name).is_file(), "{name}");
+    }
 }
 
 #[test]

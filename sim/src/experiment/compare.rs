@@ -56,16 +56,21 @@ pub(super) fn retraction(laboratory: &mut Laboratory<'_>) -> Result<Report, Expe
         threads: &plan.threads,
         frames: plan.frames,
         rounds: plan.rounds,
-        note: format!(
-            "{core} {} frames, of which the hands move in the first {}. ",
-            plan.frames + WARM_UP,
-            subject.script_frames()
-        ),
+        note: format!("{core} {}. ", frames_of(&subject, plan.frames + WARM_UP)),
         paper: "The pipeline is the fastest, 1.3 to 1.6 times as fast as OpenMP and TBB with 2 to 5 \
                 threads; one core is kept for haptics, and the serial version runs at 99 frames per \
                 second (§8.3, Fig. 18).",
     };
     study.run(laboratory, [(subject, ["fig18-retraction", "fig18-retraction-rendering"])])
+}
+
+/// How many frames there are, and what of them is not a retraction.
+fn frames_of(subject: &Subject, frames: u64) -> String {
+    let script = subject.script_frames();
+    match frames < script {
+        true => format!("Only the first {frames} of the {script} frames in which the hands move"),
+        false => format!("{frames} frames, of which the hands move in the first {script}"),
+    }
 }
 
 /// The serial executor, and every other with each of these numbers of threads.

@@ -34,7 +34,8 @@ pub mod table;
 pub mod timing;
 mod work;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::{fs, io};
 
 use self::calibrator::Calibrator;
 use self::error::ExperimentError;
@@ -145,7 +146,8 @@ pub struct Report {
 /// since it was told last, in the unit of [`Experiment::work`].
 ///
 /// # Errors
-/// An experiment cannot be run, its runs were not sound, or a file cannot be written.
+/// An experiment cannot be run, its runs were not sound, there is no such folder, or a file cannot be written. That one
+/// costs no other: it is told when all is done.
 pub fn run(
     experiments: &[Experiment],
     plan: &Plan,
@@ -153,28 +155,36 @@ pub fn run(
     progress: &mut dyn FnMut(Experiment, u64),
 ) -> Result<Vec<Report>, ExperimentError> {
     experiments.iter().try_for_each(|experiment| experiment.check(plan))?;
+    if !out.is_dir() {
+        let source = io::ErrorKind::NotADirectory.into();
+        return Err(ExperimentError::Write { path: out.to_owned(), source });
+    }
     let machine = Machine::this();
     let calibrator = Calibrator::default();
-    let mut reports = Vec::new();
+    let (mut reports, mut written) = (Vec::new(), Ok(()));
+    let mut write = |name: &str, extension: &str, bytes: &[u8]| {
+        let path = out.join(name).with_extension(extension);
+        if let Err(source) = fs::write(&path, bytes)
+            && written.is_ok()
+        {
+            written = Err(ExperimentError::Write { path, source });
+        }
+    };
     for &experiment in experiments {
         let mut progress = |work| progress(experiment, work);
         let mut laboratory = Laboratory { plan, calibrator, progress: &mut progress };
         let report = experiment.run(&mut laboratory)?;
         for table in &report.tables {
-            write(out.join(table.name).with_extension("csv"), table.csv().as_bytes())?;
+            write(table.name, "csv", table.csv().as_bytes());
         }
         for figure in &report.figures {
-            write(out.join(figure.name).with_extension("svg"), figure.svg.as_bytes())?;
-            write(out.join(figure.name).with_extension("png"), &figure.png)?;
+            write(figure.name, "svg", figure.svg.as_bytes());
+            write(figure.name, "png", &figure.png);
         }
         reports.push(report);
-        write(out.join(PAGE), page::page(&machine, plan, &reports).as_bytes())?;
+        write(PAGE, "html", page::page(&machine, plan, &reports).as_bytes());
     }
-    Ok(reports)
-}
-
-fn write(path: PathBuf, bytes: &[u8]) -> Result<(), ExperimentError> {
-    std::fs::write(&path, bytes).map_err(|source| ExperimentError::Write { path, source })
+    written.map(|()| reports)
 }
 
 /// What experiments are run with.
