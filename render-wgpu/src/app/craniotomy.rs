@@ -98,9 +98,8 @@ fn run_beside<'c>(
             let mut measure = Measure::new(args.frames, count);
             measure.start();
             let picture = outputs.picture.as_deref();
-            let on_frame = &mut |record: &FrameRecord| measure.frame(record);
             let (manager, at_hand) =
-                window.run(manager, recording, args.frames, picture, on_frame)?;
+                window.run(manager, recording, args.frames, picture, &mut measure)?;
             (manager, at_hand.surgery, measure)
         }
         None => {

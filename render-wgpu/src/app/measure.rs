@@ -71,6 +71,13 @@ impl<'a> Measure<'a> {
         }
     }
 
+    /// All since the last frame was a pause: its time does not count.
+    pub(super) fn interrupt(&mut self) {
+        let now = Instant::now();
+        self.began += now - self.last;
+        self.last = now;
+    }
+
     /// Does what belongs to the program, not to the simulation: its allocations do not count.
     pub(super) fn beside(&mut self, work: impl FnOnce()) {
         let before = (self.count)();
@@ -78,12 +85,12 @@ impl<'a> Measure<'a> {
         self.beside += (self.count)() - before;
     }
 
-    /// Heap allocations from the warm-up's end to the last frame.
+    /// Heap allocations from the warm-up's end to the last frame; none of a run that ended before.
     pub(super) fn allocations(&self) -> usize {
-        self.at_last - self.at_warm_up
+        if self.frames < self.warm_up { 0 } else { self.at_last - self.at_warm_up }
     }
 
-    /// Seconds from the start to the last swap.
+    /// Seconds from the start to the last swap, without pauses.
     pub(super) fn seconds(&self) -> f64 {
         (self.last - self.began).as_secs_f64()
     }
@@ -92,5 +99,45 @@ impl<'a> Measure<'a> {
     pub(super) fn seconds_of_first(&self, frames: u64) -> f64 {
         let times = self.frame_times.iter().take(frames as usize);
         Duration::from_nanos(times.sum()).as_secs_f64()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::thread::sleep;
+
+    use dualframe_sim::stages::PairCount;
+
+    use super::*;
+
+    const PAUSE: Duration = Duration::from_millis(200);
+
+    fn record(frame: u64) -> FrameRecord {
+        FrameRecord { frame, swapped: Instant::now(), pairs: PairCount::default() }
+    }
+
+    #[test]
+    fn a_pause_is_no_frame() {
+        let mut measure = Measure::new(None, &|| 0);
+        measure.start();
+        measure.frame(&record(0));
+        sleep(PAUSE);
+        measure.interrupt();
+        measure.frame(&record(1));
+        assert!(measure.seconds() < PAUSE.as_secs_f64(), "{}", measure.seconds());
+        assert!(measure.frame_times.iter().all(|&took| u128::from(took) < PAUSE.as_nanos()));
+    }
+
+    #[test]
+    fn allocations_count_after_warm_up() {
+        let made = std::sync::atomic::AtomicUsize::new(1_000);
+        let count = || made.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        let mut measure = Measure::new(None, &count);
+        for frame in 0..WARM_UP {
+            assert_eq!(measure.allocations(), 0, "before frame {frame}");
+            measure.frame(&record(frame));
+        }
+        measure.frame(&record(WARM_UP));
+        assert_eq!(measure.allocations(), 1);
     }
 }

@@ -131,6 +131,17 @@ fn with_causes(error: &dyn Error) -> String {
 }
 
 fn fail(line: &str, status: u8) -> ExitCode {
-    eprintln!("dualframe: {line}");
-    ExitCode::from(status)
+    let told = Told::default();
+    told.note(line);
+    told.end_with(status);
+    told.status()
+}
+
+/// Text of a file's, or the name of one, that could say more than what is to be said, as it can stand in a line.
+fn one_line(text: &str) -> String {
+    let shown = |letter: char| match letter.is_control() {
+        true => letter.escape_default().collect(),
+        false => String::from(letter),
+    };
+    text.chars().map(shown).collect()
 }

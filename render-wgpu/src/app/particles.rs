@@ -72,8 +72,8 @@ pub(super) fn run(
             let mut measure = Measure::new(args.frames, count);
             measure.start();
             let picture = outputs.picture.as_deref();
-            let on_frame = &mut |record: &FrameRecord| measure.frame(record);
-            let (manager, _) = window.run(manager, recording, args.frames, picture, on_frame)?;
+            let (manager, _) =
+                window.run(manager, recording, args.frames, picture, &mut measure)?;
             report(args, &manager, spent, &measure, None)
         }
         None => run_unwatched(args, outputs, manager, count, told)?,

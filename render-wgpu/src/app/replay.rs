@@ -201,6 +201,7 @@ impl ReplayReport {
 
     fn lines(&self, out: &mut impl Write) -> io::Result<()> {
         let Self { scene, engine, frames, checkpoints, messages, .. } = self;
+        let engine = super::one_line(engine);
         writeln!(out, "{scene}, recorded by version {engine}: {frames} frames replayed")?;
         writeln!(out, "{messages} messages from outside; {checkpoints} checkpoints agree")?;
         let Self { executor, threads, simd, fps, seconds, .. } = self;

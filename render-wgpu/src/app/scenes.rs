@@ -99,6 +99,9 @@ impl AnyScene {
     }
 }
 
+/// Bytes of a file's name in a recording; usually 4,096, the most that Linux takes.
+const MOST_OF_A_PATH: usize = 4_096;
+
 /// Who is operated on.
 pub(super) struct Patient {
     pub(super) head: Arc<Head>,
@@ -108,7 +111,7 @@ pub(super) struct Patient {
 /// What says who is operated on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct PatientSpec {
-    /// The file of the computed tomography and the hash of its voxels; none for the synthetic head.
+    /// The file of the computed tomography and the hash of what is in it; none for the synthetic head.
     ct: Option<(String, u64)>,
 }
 
@@ -166,10 +169,12 @@ impl Patient {
     }
 }
 
-/// A hash (FNV-1a, 64 bits) of an image's sides and voxels.
+/// A hash (FNV-1a, 64 bits) of an image's sides, of where it lies and of its voxels.
 fn digest(image: &Image) -> u64 {
     let mut hasher = fnv::FnvHasher::default();
     image.grid().dims().iter().for_each(|side| hasher.write(&side.to_le_bytes()));
+    let affine = image.grid().affine().to_cols_array();
+    affine.iter().for_each(|number| hasher.write(&number.to_le_bytes()));
     image.voxels().iter().for_each(|voxel| hasher.write(&voxel.to_le_bytes()));
     hasher.finish()
 }
@@ -189,7 +194,44 @@ impl SceneSpec for PatientSpec {
         if !from.flag("a computed tomography")? {
             return Ok(Self { ct: None });
         }
-        let file = from.text()?.to_owned();
-        Ok(Self { ct: Some((file, from.wide()?)) })
+        let file = from.text()?;
+        if file.len() > MOST_OF_A_PATH {
+            let what = "the length of a file's name";
+            return Err(Malformed::Value { what, value: file.len() as u64 });
+        }
+        Ok(Self { ct: Some((file.to_owned(), from.wide()?)) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dualframe_sim::image::Grid;
+    use glam::{DAffine3, DVec3};
+
+    use super::*;
+
+    #[test]
+    fn an_image_is_told_by_what_is_in_it_and_where_it_lies() {
+        let of = |spacing: f64, voxel| {
+            let grid = Grid::new([2; 3], DAffine3::from_scale(DVec3::splat(spacing)));
+            let image = Image::new(grid.expect("a valid grid"), vec![voxel; 8]);
+            digest(&image.expect("as many voxels"))
+        };
+        assert_eq!(of(1e-3, 7), of(1e-3, 7));
+        assert_ne!(of(1e-3, 7), of(2e-3, 7));
+        assert_ne!(of(1e-3, 7), of(1e-3, 8));
+    }
+
+    #[test]
+    fn names_of_files_are_as_long_as_names_can_be() {
+        let patient = |length| PatientSpec { ct: Some(("x".repeat(length), 1)) };
+        let back = |patient: &PatientSpec| {
+            let mut bytes = Vec::new();
+            patient.encode(&mut Encoder(&mut bytes));
+            PatientSpec::decode(&mut Decoder(&bytes))
+        };
+        let longest = patient(MOST_OF_A_PATH);
+        assert_eq!(back(&longest), Ok(longest));
+        assert!(back(&patient(MOST_OF_A_PATH + 1)).is_err());
     }
 }

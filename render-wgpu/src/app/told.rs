@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use super::error::RunError;
-use super::with_causes;
+use super::{one_line, with_causes};
 
 /// What is said on standard error, and the status that the program is to end with: the greatest of all that
 /// went wrong.
@@ -16,7 +16,7 @@ impl Told {
     /// Says in a line what the person at the terminal should know.
     pub(super) fn note(&self, line: &str) {
         // With nobody to be told the run goes on.
-        let _told = writeln!(io::stderr(), "dualframe: {line}");
+        let _told = writeln!(io::stderr(), "dualframe: {}", one_line(line));
     }
 
     /// The program is to end with this status, or a greater one.

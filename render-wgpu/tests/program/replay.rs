@@ -183,6 +183,8 @@ fn what_cannot_be_played() {
     told(&run(&["replay", text, "--json", "/no/such/folder/replay.json"]), 2, "/no/such/folder");
     told(&run(&["replay", text, "--threads", "0"]), 2, "--threads");
     told(&run(&["replay"]), 2, "<FILE>");
+    // A name of two lines that clears the terminal is told in one that does not.
+    told(&run(&["replay", "no\nsuch\u{1b}[2J"]), 2, "no\\nsuch\\u{1b}[2J");
     assert!(run(&["replay", text]).status.success());
     told(&run(&["--headless", "--record", "/no/such/folder/session"]), 2, "/no/such/folder");
     // Nothing can be written there.

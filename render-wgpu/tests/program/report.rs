@@ -192,4 +192,8 @@ fn a_closed_pipe_is_no_panic() {
         .expect("the program starts");
     drop(child.stdout.take());
     assert!(child.wait().expect("it ends").success());
+    if let Ok(full) = std::fs::OpenOptions::new().write(true).open("/dev/full") {
+        let ended = command(&["--objects", "0"]).stderr(full).status().expect("the program starts");
+        assert_eq!(ended.code(), Some(2));
+    }
 }

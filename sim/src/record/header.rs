@@ -3,9 +3,12 @@
 use super::wire::{Decoder, Encoder, Malformed};
 use crate::scene::ParticleScene;
 
+/// Bytes of the engine's version and of the scene's kind; usually 64.
+const MOST_OF_A_NAME: usize = 64;
+
 /// What describes a scene well enough to build it anew: every number that its building depends on.
 pub trait SceneSpec: Sized {
-    /// The name of this kind of scene, which no other has.
+    /// The name of this kind of scene, which no other has; at most 64 bytes.
     const KIND: &'static str;
 
     /// Writes it.
@@ -30,6 +33,7 @@ impl Header {
     /// Of a session in this scene, by this version of the engine.
     #[must_use]
     pub fn of<S: SceneSpec>(scene: &S) -> Self {
+        const { assert!(S::KIND.len() <= MOST_OF_A_NAME, "a scene's kind is too long a name") };
         let mut bytes = Vec::new();
         scene.encode(&mut Encoder(&mut bytes));
         let engine = env!("CARGO_PKG_VERSION").to_owned();
@@ -69,11 +73,20 @@ impl Header {
     }
 
     pub(super) fn decode(mut from: Decoder<'_>) -> Result<Self, Malformed> {
-        let engine = from.text()?.to_owned();
-        let kind = from.text()?.to_owned();
+        let engine = name(&mut from, "the length of an engine's version")?;
+        let kind = name(&mut from, "the length of a scene's kind")?;
         let scene = from.bytes()?.to_owned();
         from.finish()?;
         Ok(Self { engine, kind, scene })
+    }
+}
+
+/// A text that is shown to people, and so is short.
+fn name(from: &mut Decoder<'_>, what: &'static str) -> Result<String, Malformed> {
+    let name = from.text()?;
+    match name.len() {
+        ..=MOST_OF_A_NAME => Ok(name.to_owned()),
+        value => Err(Malformed::Value { what, value: value as u64 }),
     }
 }
 
@@ -136,6 +149,25 @@ mod tests {
         assert_eq!(read.scene(), Ok(scene));
         for length in 0..bytes.len() {
             assert_eq!(Header::decode(Decoder(&bytes[..length])), Err(Malformed::Ended));
+        }
+    }
+
+    #[test]
+    fn names_are_short() {
+        for (place, what) in ["the length of an engine's version", "the length of a scene's kind"]
+            .into_iter()
+            .enumerate()
+        {
+            for (length, expected) in
+                [(64, Ok(())), (65, Err(Malformed::Value { what, value: 65 }))]
+            {
+                let mut bytes = Vec::new();
+                let mut names = ["0.1.0".to_owned(), "other".to_owned()];
+                names[place] = "x".repeat(length);
+                names.iter().for_each(|name| Encoder(&mut bytes).text(name));
+                Encoder(&mut bytes).bytes(&[]);
+                assert_eq!(Header::decode(Decoder(&bytes)).map(drop), expected);
+            }
         }
     }
 

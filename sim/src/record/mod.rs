@@ -22,8 +22,8 @@
 //! | 4 | CRC-32 of the chunk but this field, begun with the CRC-32 of the chunk before (the first with 0) |
 //! | | the content |
 //!
-//! - Header: text, the engine's version; text, the scene's kind; bytes, the scene as its [`SceneSpec`]
-//!   writes it.
+//! - Header: text, the engine's version; text, the scene's kind, both of at most 64 bytes; bytes, the scene as its
+//!   [`SceneSpec`] writes it.
 //! - Events: 8 bytes, F: all that came from outside for the frames before frame F is in this chunk or
 //!   before; then [events](Event) until the content ends. An event is a byte, its kind; a number, by how
 //!   many frames it is later than the one before of its sort (messages, or all others), or than the F of

@@ -40,6 +40,7 @@ use self::view::{Shown, View};
 use super::args::{Products, Way, entry};
 use super::error::RunError;
 use super::manage::{Manage, Spent, manage};
+use super::measure::Measure;
 use super::pictures;
 use super::recording::Recording;
 use super::told::Told;
@@ -143,7 +144,7 @@ impl<'a, S: Scenario> Session<'a, S> {
         mut recording: Recording<'_>,
         frames: Option<u64>,
         picture: Option<&File>,
-        on_frame: &mut OnFrame<'_>,
+        measure: &mut Measure<'_>,
     ) -> Result<(VeManager, S), RunError> {
         self.view.turn_to(|_| None, manager.mailbox());
         let mut left = frames.unwrap_or(u64::MAX);
@@ -156,10 +157,11 @@ impl<'a, S: Scenario> Session<'a, S> {
             };
             if wanted == 0 {
                 self.stand_still(&manager);
+                measure.interrupt();
                 continue;
             }
             let before = manager.frame();
-            manager = self.advance(manager, &mut recording, wanted.min(left), on_frame)?;
+            manager = self.advance(manager, &mut recording, wanted.min(left), measure)?;
             left -= manager.frame() - before;
         }
         recording.end(&manager);
@@ -185,12 +187,12 @@ impl<'a, S: Scenario> Session<'a, S> {
         manager: VeManager,
         recording: &mut Recording<'_>,
         frames: u64,
-        on_frame: &mut OnFrame<'_>,
+        measure: &mut Measure<'_>,
     ) -> Result<VeManager, RunError> {
         let stats = Arc::clone(&self.view.stats);
         let mut on_frame = |record: &FrameRecord| {
             stats::lock(&stats).note(record);
-            on_frame(record);
+            measure.frame(record);
         };
         let (settings, timeline) = (self.settings(), Arc::clone(&self.view.timeline));
         let make = move |scene| manage(scene, settings, Some(&timeline));

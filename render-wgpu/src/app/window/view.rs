@@ -22,7 +22,7 @@ use wgpu::{
 };
 use winit::event::MouseButton;
 use winit::event_loop::EventLoop;
-use winit::platform::pump_events::EventLoopExtPumpEvents;
+use winit::platform::pump_events::{EventLoopExtPumpEvents, PumpStatus};
 use winit::window::Window;
 
 use super::controls::Controls;
@@ -169,7 +169,12 @@ impl<H: Hand> View<H> {
 
     /// Does what the person did, after waiting for it for up to `timeout`.
     pub(super) fn attend(&mut self, timeout: Duration) {
-        self.event_loop.pump_app_events(Some(timeout), &mut self.input);
+        let pumped = self.event_loop.pump_app_events(Some(timeout), &mut self.input);
+        if let PumpStatus::Exit(_) = pumped {
+            // Nobody here ends the loop: it does so itself when there is no display any more.
+            let reason = "the display is gone".to_owned();
+            self.failure.get_or_insert(GraphicsError::Surface { reason });
+        }
         let mut gestures = std::mem::take(&mut self.input.gestures);
         for gesture in gestures.drain(..) {
             self.act(gesture);
