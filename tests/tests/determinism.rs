@@ -56,10 +56,11 @@ fn default() -> Settings {
     Settings::default()
 }
 
-fn one_hash_for(objects: usize) {
+/// `seeds` are fewer where there is more in each frame.
+fn one_hash_for(objects: usize, seeds: u64) {
     let mut hashes = Vec::new();
     for gravity in [false, true] {
-        for seed in 1..=3 {
+        for seed in 1..=seeds {
             let scene = ParticleScene { seed, gravity, ..ParticleScene::new(objects) };
             let mut all = all_settings().into_iter();
             let first = outcome(scene, all.next().expect("there are settings"));
@@ -71,32 +72,32 @@ fn one_hash_for(objects: usize) {
     }
     hashes.sort_unstable();
     hashes.dedup();
-    assert_eq!(hashes.len(), 6, "other seeds and other forces are other states");
+    assert_eq!(hashes.len() as u64, 2 * seeds, "other seeds and other forces are other states");
 }
 
 #[test]
 fn one_particle() {
-    one_hash_for(1);
+    one_hash_for(1, 3);
 }
 
 #[test]
 fn two_particles() {
-    one_hash_for(2);
+    one_hash_for(2, 3);
 }
 
 #[test]
 fn seven_particles() {
-    one_hash_for(7);
+    one_hash_for(7, 3);
 }
 
 #[test]
 fn a_hundred_particles() {
-    one_hash_for(100);
+    one_hash_for(100, 3);
 }
 
 #[test]
 fn three_hundred_particles() {
-    one_hash_for(300);
+    one_hash_for(300, 1);
 }
 
 #[test]
