@@ -6,6 +6,24 @@
 //! [`stages::Stages`], work on [`block::Block`]s of objects, and are the same for every executor; so
 //! are the results, bit for bit, whatever the executor, the number of threads and the blocking.
 //!
+//! ```
+//! use dualframe_sim::manager::{Settings, VeManager};
+//! use dualframe_sim::render::NullRenderer;
+//! use dualframe_sim::scene::ParticleScene;
+//!
+//! // Ten deformable particles in a room; the pipeline, two threads.
+//! let scene = ParticleScene::new(10).build()?;
+//! let mut manager = VeManager::new(scene, Settings { threads: 2, ..Settings::default() })?;
+//! let mut renderer = NullRenderer::new();
+//! let mut collisions = 0;
+//! manager.run(60, &mut renderer, &mut |record| collisions += record.pairs.collisions)?;
+//! assert_eq!((manager.frame(), renderer.swaps()), (60, 60));
+//! println!("{collisions} collisions, state {:016x}", manager.state_hash());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! `examples/own_object.rs` has an object with a behaviour, an interaction and a renderer of one's own.
+//!
 //! | paper | module |
 //! |---|---|
 //! | §4.1, Fig. 2: 3D Object (visual properties, geometry, behaviour, renderer) | [`object`], [`geometry`], [`behavior`], [`render`] |
