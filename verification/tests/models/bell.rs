@@ -128,33 +128,45 @@ fn render_wakes_holders_only() {
     });
 }
 
+/// Who sleeps.
+struct Asleep {
+    for_holders: bool,
+    leaves: bool,
+    flag: &'static AtomicBool,
+}
+
 /// Sleeps and wakes as a futex does: whoever is not asleep when the epoch moves does not fall
 /// asleep, and one call wakes one.
 struct One {
     /// Puts falling asleep and waking in an order.
     bucket: AtomicU32,
-    asleep: Mutex<Vec<(bool, &'static AtomicBool)>>,
+    asleep: Mutex<Vec<Asleep>>,
     flags: Mutex<Vec<&'static AtomicBool>>,
-    /// This thread's sleep returns at once, as every sleep may.
-    restless: Mutex<Option<loom::thread::ThreadId>>,
+    /// The thread that leaves when it wakes.
+    leaver: Mutex<Option<loom::thread::ThreadId>>,
+    /// Its sleep returns at once, as every sleep may.
+    restless: bool,
+    /// Whether the one that leaves, and the one that stays, was woken by a call.
+    woken: Mutex<[bool; 2]>,
     /// The model is over for whoever still sleeps. Not loom's: it orders nothing.
     over: Mutex<bool>,
 }
 
 impl Waiting for One {
     fn sleep(&self, bell: &Bell, seen: Epoch) {
-        if *lock(&self.restless) == Some(loom::thread::current().id()) {
+        let leaves = *lock(&self.leaver) == Some(loom::thread::current().id());
+        if leaves && self.restless {
             return;
         }
         // Made before the threads were: loom counts the making of an atomic as an access.
-        let Some(woken) = lock(&self.flags).pop() else { panic!("sleeps too often") };
-        lock(&self.asleep).push((bell.is_for_holders(), woken));
+        let Some(flag) = lock(&self.flags).pop() else { panic!("sleeps too often") };
+        lock(&self.asleep).push(Asleep { for_holders: bell.is_for_holders(), leaves, flag });
         self.bucket.fetch_add(1, Ordering::AcqRel);
         if bell.rung_since(seen) {
-            lock(&self.asleep).retain(|(_, at)| !std::ptr::eq(*at, woken));
+            lock(&self.asleep).retain(|at| !std::ptr::eq(at.flag, flag));
             return;
         }
-        while !woken.load(Ordering::Acquire) && !*lock(&self.over) {
+        while !flag.load(Ordering::Acquire) && !*lock(&self.over) {
             loom::hint::spin_loop();
         }
     }
@@ -164,20 +176,28 @@ impl Waiting for One {
         for _ in 0..count {
             let chosen = {
                 let mut asleep = lock(&self.asleep);
-                let at = asleep.iter().position(|at| at.0 == bell.is_for_holders());
-                at.map(|at| asleep.remove(at).1)
+                let at = asleep.iter().position(|at| at.for_holders == bell.is_for_holders());
+                at.map(|at| asleep.remove(at))
             };
             let Some(chosen) = chosen else { break };
-            chosen.store(true, Ordering::Release);
+            lock(&self.woken)[usize::from(!chosen.leaves)] = true;
+            chosen.flag.store(true, Ordering::Release);
         }
     }
 }
 
 /// A worker announces one update that it queued, and is suspended. Of two that wait, one leaves
 /// when it wakes, whatever for: the other does the update. It may hold the token, and wait at
-/// another bell; and the one that leaves may have woken by itself.
+/// another bell; and the one that leaves may have woken by itself. The outcome is which of these cases it
+/// was, and which of the two a call woke.
 fn leaver_passes_it_on() {
-    let all = [[false, false], [false, true], [true, true]];
+    let woken = [[false, false], [false, true], [true, false], [true, true]];
+    let cases = [[false, false], [false, true], [true, true]];
+    // Whoever wakes by itself is not woken.
+    let all = cases.into_iter().flat_map(|[holder, restless]| {
+        let woken = woken.into_iter().filter(move |[leaver, _]| !(restless && *leaver));
+        woken.map(move |woken| ([holder, restless], woken))
+    });
     check("bell::leaver_passes_it_on", Some(1), 9, all, |order| {
         let [holder, restless] = [order / 3 == 2, order / 3 > 0];
         let setup = Setup { frames: 1, ..Setup::default() };
@@ -185,7 +205,9 @@ fn leaver_passes_it_on() {
             bucket: AtomicU32::new(0),
             asleep: Mutex::default(),
             flags: Mutex::new((0..8).map(|_| &*lend(AtomicBool::new(false))).collect()),
-            restless: Mutex::default(),
+            leaver: Mutex::default(),
+            restless,
+            woken: Mutex::default(),
             over: Mutex::default(),
         });
         let (pipeline, world) = build_with(setup, waiting);
@@ -198,9 +220,7 @@ fn leaver_passes_it_on() {
         }
         let interact: Role<Step> = Box::new(move || step(suspended, world));
         let leave: Role<Step> = Box::new(move || {
-            if restless {
-                *lock(&waiting.restless) = Some(loom::thread::current().id());
-            }
+            *lock(&waiting.leaver) = Some(loom::thread::current().id());
             let worker = pipeline.worker();
             worker.wait();
             Step::Idle
@@ -222,6 +242,6 @@ fn leaver_passes_it_on() {
         });
         let done = together(order, vec![interact, leave, stay]);
         assert_eq!(done[2], Step::Worked(Stage::Update), "the update was done");
-        [holder, restless]
+        ([holder, restless], *lock(&waiting.woken))
     });
 }

@@ -81,18 +81,26 @@ fn two_senders() {
 }
 
 /// The receiver of frame 1 takes what was posted in frame 0 and puts back what is of frame 1 while
-/// a sender posts more of it; nothing is lost, and nothing of frame 1 comes early.
+/// a sender posts more of it; nothing is lost, and nothing of frame 1 comes early. The outcome is what
+/// the receiver then sees of frame 1: the sender's letter is there or not yet.
 fn this_frame_stays() {
-    check("inbox::this_frame_stays", Some(3), 2, [()], |order| {
+    let expected = [&[11][..], &[11, 20]].map(<[u32]>::to_vec);
+    check("inbox::this_frame_stays", Some(3), 2, expected, |order| {
         let (post, inbox) = (post(3), inbox());
         post.post(inbox, Frame(0), from(1, 0), 110).unwrap();
         post.post(inbox, Frame(1), from(1, 1), 111).unwrap();
-        let send: Role<()> = Box::new(move || {
+        let send: Role<Vec<u32>> = Box::new(move || {
             post.post(inbox, Frame(1), from(2, 0), 120).unwrap();
+            Vec::new()
         });
-        let receive: Role<()> = Box::new(move || assert_eq!(collect(post, inbox, 1), [10]));
-        together(order, vec![send, receive]);
-        assert_eq!(collect(post, inbox, 2), [11, 20], "letters of frame 1, in frame 2");
+        let receive: Role<Vec<u32>> = Box::new(move || {
+            assert_eq!(collect(post, inbox, 1), [10], "letters of frame 0, in frame 1");
+            collect(post, inbox, 2)
+        });
+        let seen = together(order, vec![send, receive]).remove(1);
+        let all = [seen.clone(), collect(post, inbox, 2)].concat();
+        assert_eq!(all, [11, 20], "letters of frame 1, in frame 2, each once");
+        seen
     });
 }
 
