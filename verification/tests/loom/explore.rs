@@ -26,7 +26,7 @@ explored! {
     shared: sleepers_end leaver_calls busy_after_it all_rendered_meanwhile;
     pipeline: spatial_after_update spatial_after_render spatial_after_swap pairwise_after_update
         pairwise_after_render pairwise_after_swap pools_come_round two_tokens shared_renderer
-        solitary_unit letters errors_do_no_harm three_pairs rendering_comes_first two_holders_at_a_swap
+        solitary_unit letters errors_do_no_harm within three_pairs rendering_comes_first two_holders_at_a_swap
         sleeps_through_a_swap rendering_waits_for_a_swap finished_shows_all;
     cost: alone;
 }

@@ -26,6 +26,7 @@ pub(crate) const ALL: &[Model] = &[
     ("pipeline::solitary_unit", solitary_unit),
     ("pipeline::letters", letters),
     ("pipeline::errors_do_no_harm", errors_do_no_harm),
+    ("pipeline::within", within),
     SEVERAL_INTERACTIONS[0],
     ("pipeline::finished_shows_all", finished_shows_all),
 ];
@@ -125,8 +126,8 @@ fn two_workers(
     let alone = did.map(|did| (did, AfterSwap));
     let both = overlaps.iter().map(|&overlap| ([true, true], overlap));
     let mut expected: Vec<_> = alone.into_iter().chain(both).collect();
-    if setup.pairs().len() > 1 {
-        // One of several pairs is met before another unit is rendered.
+    if setup.units > 2 {
+        // One of several pairs of units is met before another unit is rendered.
         expected.push(([false, true], BeforeSwap));
     }
     if setup.solitary_from < setup.units {
@@ -238,6 +239,12 @@ fn letters() {
 fn errors_do_no_harm() {
     let setup = Setup { fail: true, ..Setup::default() };
     two_workers("pipeline::errors_do_no_harm", setup, (1, 3, 20), ANY);
+}
+
+/// Two units that interact with each other and each with itself, as blocks of objects do.
+fn within() {
+    let setup = Setup { within: true, ..Setup::default() };
+    two_workers("pipeline::within", setup, (1, 2, 20), ANY);
 }
 
 /// Three units, each pair of which interacts: a unit that enters last finds two, and its worker

@@ -20,7 +20,7 @@ use std::sync::Mutex;
 /// What a callback saw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Event {
-    /// Two units were tested in a frame.
+    /// Two units were tested in a frame, or one asked whether it interacts with itself, and does.
     Met([u32; 2], u32),
     /// An interaction was detected.
     Interacted([u32; 2], u32),
@@ -60,6 +60,8 @@ pub(crate) struct Setup {
     pub(crate) units: u32,
     /// Whether no bounding volumes overlap.
     pub(crate) far: bool,
+    /// Whether each also interacts with itself; for `Spatial`, not `far`.
+    pub(crate) within: bool,
     /// Frames.
     pub(crate) frames: u32,
     /// Kind of broad phase.
@@ -90,6 +92,7 @@ impl Setup {
     pub(crate) const DEFAULT: Self = Self {
         units: 2,
         far: false,
+        within: false,
         frames: 2,
         broad_phase: BroadPhase::Spatial,
         entry: Entry::AfterUpdate,
@@ -103,7 +106,8 @@ impl Setup {
 
     pub(crate) fn pairs(&self) -> Vec<[u32; 2]> {
         let social = self.units.min(self.solitary_from);
-        (0..social).flat_map(|b| (0..b).map(move |a| [a, b])).collect()
+        let others = |b| if self.within { 0..b + 1 } else { 0..b };
+        (0..social).flat_map(|b| others(b).map(move |a| [a, b])).collect()
     }
 }
 
@@ -178,7 +182,11 @@ impl Environment for World {
         if self.setup.patience == Patience::Entry && (body.id, body.updates) == (0, 1) {
             self.await_rendering(1);
         }
-        false
+        if self.setup.within {
+            self.log(Met([body.id; 2], body.updates));
+            note(|did| did.found += 1);
+        }
+        self.setup.within
     }
 
     fn interact(
