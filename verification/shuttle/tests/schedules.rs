@@ -1,6 +1,7 @@
 //! Random and PCT schedules of whole runs of the real core: four workers, twelve units, four frames.
 //! What callbacks see is judged after each; a wake-up that is lost is a deadlock, which shuttle
-//! reports. A failure prints its schedule, for [`shuttle::replay`].
+//! reports. A failure prints its schedule: `ReplayScheduler::new_from_encoded` in place of the scheduler of
+//! the `Runner` that failed plays it again, on stacks of [`os::config`]'s size, which `shuttle::replay` has not.
 
 use dualframe_core_shuttle as dut;
 
