@@ -19,10 +19,10 @@ pub(crate) struct Arguments {
     /// Frames of each run; by default about as many as take 150 ms on one thread.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) frames: Option<u64>,
-    /// Numbers of particles.
+    /// Numbers of particles; of no effect where there are none.
     #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
     pub(crate) objects: Vec<usize>,
-    /// Threads of the parallel executors.
+    /// Threads of the parallel executors; of no effect where there are none.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = at_least_one(MAX_THREADS as u64))]
     pub(crate) threads: usize,
     /// See only whether it runs.
