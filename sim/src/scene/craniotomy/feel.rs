@@ -49,10 +49,12 @@ pub(super) struct Feel<'c> {
     now: Option<ToolState>,
     /// The device at the last swaps, the last one last.
     past: VecDeque<ToolState>,
-    /// The tool as it was drawn last.
+    /// The tool as it is in the frame that is being drawn, if it was drawn already.
+    next: Option<Seen>,
+    /// The tool in the last frame that was drawn.
     tool: Option<Seen>,
-    /// For each volume of bone.
-    proxies: Vec<(ObjectId, Proxy)>,
+    /// In the order of their numbers, whichever is drawn first.
+    bones: Vec<Near>,
     /// Where the hand felt the surface of bone, if it touches any.
     rest: Option<Vec3>,
     /// By how much a drill in bone is led ahead of the device.
@@ -61,6 +63,13 @@ pub(super) struct Feel<'c> {
     grasp: Vec3,
     /// Of a blade in what it cuts, and of the tool on bone.
     drags: [Drag; 2],
+}
+
+/// The place of the device on a volume of bone.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    bone: ObjectId,
+    proxy: Proxy,
 }
 
 /// What was seen of a tool.
@@ -76,9 +85,9 @@ struct Seen {
 impl<'c> Feel<'c> {
     pub(super) fn new(end: SimulationEnd<'c>) -> Self {
         let past = VecDeque::with_capacity(HELD + 2);
-        let (now, tool, proxies, drags) = (None, None, Vec::new(), Default::default());
+        let (now, next, tool, bones, drags) = (None, None, None, Vec::new(), Default::default());
         let (rest, shift, grasp) = (None, None, Vec3::ZERO);
-        Self { end, now, past, tool, proxies, rest, shift, grasp, drags }
+        Self { end, now, past, next, tool, bones, rest, shift, grasp, drags }
     }
 
     pub(super) fn into_end(self) -> SimulationEnd<'c> {
@@ -100,37 +109,44 @@ impl<'c> Feel<'c> {
             self.grasp = tip;
         }
         let coupling = tool.coupling();
-        self.tool = Some(Seen { tip, work, coupling, push: tool.coupling_stiffness() });
+        self.next = Some(Seen { tip, work, coupling, push: tool.coupling_stiffness() });
     }
 
-    /// The bone, or a piece of it, is this in the frame that is being drawn.
+    /// The bone, or a piece of it, is this in the frame that is being drawn. The tool, of which it depends whether
+    /// bone is felt, may not have been drawn yet.
     pub(super) fn bone(&mut self, object: &Object) {
         let (Some(volume), Some(device)) = (object.geometry.as_volume(), self.look()) else {
             return;
         };
-        let Some(Seen { tip, work, coupling, .. }) = self.tool else { return };
-        let id = object.id();
-        let known = self.proxies.iter().position(|&(other, _)| other == id);
-        let place = known.unwrap_or_else(|| {
-            self.proxies.push((id, Proxy::new(tip)));
-            self.proxies.len() - 1
+        let (bone, place) = (object.id(), device.sample.position);
+        let known = self.bones.binary_search_by_key(&bone, |near| near.bone);
+        let index = known.unwrap_or_else(|index| {
+            self.bones.insert(index, Near { bone, proxy: Proxy::new(place) });
+            index
         });
-        let (_, proxy) = &mut self.proxies[place];
-        let holds_it = id != SKULL && work.held != Vec3::ZERO;
-        if coupling.is_some() || holds_it {
-            *proxy = Proxy::new(tip);
-        } else {
-            proxy.follow(device.sample.position, volume);
-        }
+        self.bones[index].proxy.follow(place, volume);
     }
 
     /// A frame is drawn: tells the loop what to exert.
     pub(super) fn deliver(&mut self) {
+        self.tool = self.next.take();
+        self.pass_through();
         if let Some(model) = self.model() {
             // A model that is no number is left out, and forces fade if none comes.
             let _ = self.end.deliver(model);
         }
         self.now = None;
+    }
+
+    /// Bone does not hold out a drill, which makes its own way, nor what is held the tool that holds it.
+    fn pass_through(&mut self) {
+        let Some(Seen { tip, work, coupling, .. }) = self.tool else { return };
+        let holds = work.held != Vec3::ZERO;
+        for Near { bone, proxy } in &mut self.bones {
+            if coupling.is_some() || (holds && *bone != SKULL) {
+                *proxy = Proxy::new(tip);
+            }
+        }
     }
 
     /// The frame was swapped: where the device is that the tool follows, from now on.
@@ -145,8 +161,8 @@ impl<'c> Feel<'c> {
             // A drill finds its own way.
             sample.position += self.shift.unwrap_or_default();
         } else {
-            for (_, proxy) in &self.proxies {
-                sample.position = proxy.held_out(sample.position);
+            for near in &self.bones {
+                sample.position = near.proxy.held_out(sample.position);
             }
         }
         Some(sample)
@@ -215,7 +231,7 @@ impl<'c> Feel<'c> {
     /// Of the bone that is nearest, or touched deepest, with its normal if it is touched.
     fn nearest(&mut self, seen: &Seen, device: &ToolState) -> (LocalModel, Option<Vec3>) {
         let stiffness = seen.push.map_or(ContactStiffness::BONE, ContactStiffness::new);
-        let models = self.proxies.iter().map(|(_, proxy)| proxy.model(device, stiffness));
+        let models = self.bones.iter().map(|near| near.proxy.model(device, stiffness));
         let press = |model: &LocalModel| model.normal.map(|normal| model.force.dot(normal));
         let (position, time) = (device.sample.position, device.time);
         let far = LocalModel { position, time, ..LocalModel::FREE };
@@ -293,46 +309,5 @@ fn sum(first: LocalModel, other: LocalModel) -> LocalModel {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::device::law::ForceSettings;
-    use crate::device::link::HapticLink;
-    use crate::device::motion::{Motion, ScriptedDevice};
-    use crate::device::proxy::Surface;
-    use crate::device::thread::HapticLoop;
-
-    /// Bone below y = 0.
-    struct Flat;
-
-    impl Surface for Flat {
-        fn distance(&self, point: Vec3) -> (f32, Vec3) {
-            (point.y, Vec3::Y)
-        }
-    }
-
-    /// A tool that cuts, 1 mm deep in bone: what it cuts holds it back, but bone does not when it goes out.
-    #[test]
-    fn bone_only_pushes_also_beside_what_is_cut() {
-        let mut link = HapticLink::new();
-        let (end, simulation) = link.split();
-        let mut feel = Feel::new(simulation);
-        let place = Vec3::Y * -1e-3;
-        let device = ScriptedDevice::new(Motion::at_rest(place).expect("finite"));
-        HapticLoop::new(device, end, ForceSettings::default()).tick(0.1);
-        let mut proxy = Proxy::new(Vec3::Y);
-        proxy.follow(place, &Flat);
-        feel.proxies.push((SKULL, proxy));
-        let work = Work { cuts: true, ..Work::default() };
-        feel.tool = Some(Seen { tip: place, work, coupling: None, push: None });
-        // It takes a first look for the blade to be held somewhere.
-        feel.model().expect("a device and a tool");
-        let [blade, _] = &mut feel.drags;
-        blade.anchor = Some(place + Vec3::X * 1e-3);
-        let model = feel.model().expect("a device and a tool");
-        let inside = model.force_at(place);
-        assert!((inside.y - 2.0).abs() < 1e-3 && inside.x > 0.3, "{inside}");
-        let outside = model.force_at(Vec3::Y * 1e-3);
-        let cut = CUTTING / CUTTING_GIVES * 2e-3;
-        assert!((outside.y + cut).abs() < 1e-3 && outside.x > 0.3, "{outside}");
-    }
-}
+#[path = "feel_tests.rs"]
+mod tests;
