@@ -70,6 +70,8 @@ pub(super) struct Feel<'c> {
 struct Near {
     bone: ObjectId,
     proxy: Proxy,
+    /// Whether the bone was drawn in the frame that is being drawn.
+    is_drawn: bool,
 }
 
 /// What was seen of a tool.
@@ -121,15 +123,19 @@ impl<'c> Feel<'c> {
         let (bone, place) = (object.id(), device.sample.position);
         let known = self.bones.binary_search_by_key(&bone, |near| near.bone);
         let index = known.unwrap_or_else(|index| {
-            self.bones.insert(index, Near { bone, proxy: Proxy::new(place) });
+            self.bones.insert(index, Near { bone, proxy: Proxy::new(place), is_drawn: true });
             index
         });
-        self.bones[index].proxy.follow(place, volume);
+        let near = &mut self.bones[index];
+        near.proxy.follow(place, volume);
+        near.is_drawn = true;
     }
 
     /// A frame is drawn: tells the loop what to exert.
     pub(super) fn deliver(&mut self) {
         self.tool = self.next.take();
+        // What is drawn no more, since it was removed or hidden, is not there to be felt.
+        self.bones.retain_mut(|near| std::mem::take(&mut near.is_drawn));
         self.pass_through();
         if let Some(model) = self.model() {
             // A model that is no number is left out, and forces fade if none comes.
@@ -142,7 +148,7 @@ impl<'c> Feel<'c> {
     fn pass_through(&mut self) {
         let Some(Seen { tip, work, coupling, .. }) = self.tool else { return };
         let holds = work.held != Vec3::ZERO;
-        for Near { bone, proxy } in &mut self.bones {
+        for Near { bone, proxy, .. } in &mut self.bones {
             if coupling.is_some() || (holds && *bone != SKULL) {
                 *proxy = Proxy::new(tip);
             }

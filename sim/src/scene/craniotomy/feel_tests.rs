@@ -180,6 +180,31 @@ fn a_burr_feels_the_same_in_any_order_of_drawing() {
     assert!(felt > 30, "something was felt in {felt} frames");
 }
 
+/// Bone that is drawn no more, since it was removed or hidden, neither pushes a hand nor holds its tool out.
+#[test]
+fn what_is_not_drawn_is_not_felt() {
+    let inside = LID - Vec3::Z * 1e-3;
+    let motion = way(&[(0, LID + Vec3::Z * 0.005, false), (10, inside, false)]);
+    let mut link = HapticLink::new();
+    let mut hand = Hand::new(&mut link, &motion);
+    let mut executor = scene(Instrument::Elevator, LID + Vec3::Z * 0.005);
+    let mut after = |frames: u64, drawn: &[ObjectId]| {
+        let mut seen = None;
+        for _ in 0..frames {
+            executor.advance(1, &mut NullRenderer::new(), &mut |_| {}).expect("no table is full");
+            seen = Some(hand.frame(&executor, drawn));
+        }
+        seen.expect("a frame")
+    };
+    let (wrench, sample) = after(40, &ORDERS[0]);
+    assert!((wrench.force.z - 2.0).abs() < 0.3, "{wrench:?}");
+    assert!((sample.position.z - LID.z).abs() < 2e-4, "{sample:?} is held out");
+    let (_, sample) = after(1, &[TOOL, SKULL]);
+    assert_eq!(sample.position, inside);
+    let (wrench, _) = after(20, &[TOOL, SKULL]);
+    assert_eq!(wrench, Wrench::default());
+}
+
 /// A tool that cuts, 1 mm deep in bone: what it cuts holds it back, but bone does not when it goes out.
 #[test]
 fn bone_only_pushes_also_beside_what_is_cut() {
@@ -191,7 +216,7 @@ fn bone_only_pushes_also_beside_what_is_cut() {
     HapticLoop::new(device, end, ForceSettings::default()).tick(0.1);
     let mut proxy = Proxy::new(Vec3::Y);
     proxy.follow(place, &Flat);
-    feel.bones.push(Near { bone: SKULL, proxy });
+    feel.bones.push(Near { bone: SKULL, proxy, is_drawn: true });
     let work = Work { cuts: true, ..Work::default() };
     feel.tool = Some(Seen { tip: place, work, coupling: None, push: None });
     // It takes a first look for the blade to be held somewhere.
