@@ -146,6 +146,34 @@ fn shapes_are_tested_exactly_and_told_the_sum() {
     }
 }
 
+/// A ball on a rod, as an instrument is: within it the other part's surface is none.
+#[test]
+fn parts_of_a_shape_do_not_hide_each_other() {
+    let stages = stages(POINTS, SHAPES, NodesInShape);
+    let lollipop = || {
+        let rod = SharedShape::capsule(Vec3::Z * 0.75, Vec3::Z * 3.25, 0.75);
+        let ball = (Pose::from_translation(Vec3::Z), SharedShape::ball(1.0));
+        let shape = SharedShape::compound(vec![ball, (Pose::IDENTITY, rod)]);
+        let mut tool = tool(0, shape, Vec3::ZERO);
+        tool.geometry.as_rigid_mut().expect("a tool").pose.rotation = Quat::from_rotation_x(0.3);
+        tool.refit();
+        tool
+    };
+    let turned = |place: Vec3| Quat::from_rotation_x(0.3) * place;
+    // The ball's surface is at 1 m, the rod's, which is within the ball here, at 0.75 m.
+    for (place, depth) in [(0.88, 0.22), (0.87, 0.23), (0.75, 0.35), (0.7, 0.4), (1.05, 0.05)] {
+        let node = turned(Vec3::new(place, 0.0, 1.0));
+        let (segments, _) = interact(&stages, lollipop(), point_at(1, node));
+        assert_impulse(&segments[0][0], 1, 0, turned(Vec3::X) * (100.0 * depth));
+    }
+    // Where only the rod is.
+    for (place, depth) in [(0.8, 0.05), (0.7, 0.15)] {
+        let node = turned(Vec3::new(place, 0.0, 2.5));
+        let (segments, _) = interact(&stages, lollipop(), point_at(1, node));
+        assert_impulse(&segments[0][0], 1, 0, turned(Vec3::X) * (100.0 * depth));
+    }
+}
+
 #[test]
 fn damping_never_pulls_and_friction_only_stops() {
     let mut stages = stages(POINTS, SHAPES, NodesInShape);

@@ -1,6 +1,7 @@
 //! Detection between a deformable surface and a rigid shape.
 
 use glam::Vec3;
+use parry3d::query::PointProjection;
 
 use super::Detection;
 use super::contact::Contact;
@@ -72,15 +73,30 @@ fn in_shape(mesh: &Mesh, rigid: &Rigid, bounds: &Bounds, touches: &mut Touches) 
     simd.run(Select { mesh, bounds: bounds.inflated(radius), near });
     for (index, &node) in near.nodes().iter().enumerate() {
         let position = Vec3::from_array(near.position(index));
-        let projection = rigid.shape.project_point(&rigid.pose, position, false);
-        let out = position - projection.point;
+        if let Some((depth, normal)) = deepest(rigid, position, radius) {
+            list.push(Touch { nodes: [node, Contact::BODY], normal: normal.to_array(), depth });
+        }
+    }
+}
+
+/// How deep a node's contact sphere is in a shape, and the direction out. Of a shape's parts the one in which it is
+/// deepest counts: another one's surface may be nearer, but within this one.
+fn deepest(rigid: &Rigid, position: Vec3, radius: f32) -> Option<(f32, Vec3)> {
+    let touch = |projection: PointProjection| {
+        let out = position - projection.transform_by(&rigid.pose).point;
         let distance = out.length();
         let (depth, side) =
             if projection.is_inside { (radius + distance, -1.0) } else { (radius - distance, 1.0) };
         // A node exactly on the surface has no direction out; the next frame will tell.
-        if depth > 0.0 && distance > 0.0 {
-            let normal = (out * (side / distance)).to_array();
-            list.push(Touch { nodes: [node, Contact::BODY], normal, depth });
+        (depth > 0.0 && distance > 0.0).then(|| (depth, out * (side / distance)))
+    };
+    let place = rigid.pose.inverse_transform_point(position);
+    match rigid.shape.as_compound() {
+        Some(compound) => {
+            let parts = compound.shapes().iter();
+            let touches = parts.map(|(pose, part)| part.project_point(pose, place, false));
+            touches.filter_map(touch).max_by(|a, b| a.0.total_cmp(&b.0))
         }
+        None => touch(rigid.shape.project_local_point(place, false)),
     }
 }
