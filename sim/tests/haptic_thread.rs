@@ -97,7 +97,7 @@ fn goes_on_after_errors() {
         let settings = ForceSettings::default();
         let _haptics = HapticThread::spawn(scope, device, end, settings, RATE).expect("it starts");
         until(&mut simulation, |tool| tool.fault == Some(DeviceError::Timeout));
-        let tool = until(&mut simulation, |tool| tool.fault == Some(DeviceError::NonFinite));
+        let tool = until(&mut simulation, |tool| tool.fault == Some(DeviceError::InvalidPose));
         assert_eq!(tool.sample.position, Vec3::X, "the last place that it told");
         let tool = until(&mut simulation, |tool| tool.fault.is_none() && tool.ticks.failed > 3);
         assert!(tool.ticks.failed < tool.ticks.due);
@@ -204,7 +204,7 @@ fn a_place_where_no_hand_is_is_no_place() {
         assert_eq!(haptics.tick(f64::from(tick) / RATE), Wrench::default());
     }
     let tool = simulation.tool();
-    assert_eq!((tool.fault, tool.ticks.failed), (Some(DeviceError::NonFinite), 3));
+    assert_eq!((tool.fault, tool.ticks.failed), (Some(DeviceError::InvalidPose), 3));
 }
 
 #[test]

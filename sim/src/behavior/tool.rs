@@ -342,7 +342,7 @@ impl Behavior for Tool {
 
     fn process(&mut self, message: &Message) {
         match *message {
-            Message::Device(sample) if sample.is_finite() => self.device = sample,
+            Message::Device(sample) if sample.is_valid() => self.device = sample,
             Message::TakeUp(instrument) if instrument != self.instrument => {
                 self.instrument = instrument;
                 self.before = None;

@@ -61,11 +61,13 @@ impl DeviceSample {
         Self { position, orientation: Quat::IDENTITY, buttons: 0 }
     }
 
-    /// Whether every number of it is finite, and its place at most [`FARTHEST`] away: what is computed from it is
-    /// finite then, too.
+    /// Whether its place is at most [`FARTHEST`] away along each axis and its orientation, to half a percent, of unit
+    /// length: what is computed from it is finite then.
     #[must_use]
-    pub fn is_finite(&self) -> bool {
-        self.position.abs().cmple(Vec3::splat(FARTHEST)).all() && self.orientation.is_finite()
+    pub fn is_valid(&self) -> bool {
+        let within = self.position.abs().cmple(Vec3::splat(FARTHEST)).all();
+        let square: f32 = self.orientation.to_array().iter().map(|part| part * part).sum();
+        within && (square - 1.0).abs() < 0.01
     }
 }
 
@@ -114,9 +116,12 @@ pub enum DeviceError {
     /// It did not answer within the time that its driver allows.
     #[error("the device did not answer in time")]
     Timeout,
-    /// A position or an orientation that is no number, or a place where no hand is.
-    #[error("the device told a pose that is not finite, or more than {FARTHEST} m away")]
-    NonFinite,
+    /// A place where no hand is, an orientation that is not of unit length, or what is no number.
+    #[error(
+        "the device told a pose that is none: a number that is not finite, a place more than {FARTHEST} m away, or \
+             an orientation that is not of unit length"
+    )]
+    InvalidPose,
     /// The driver panicked: the loop is over.
     #[error("the device's driver has panicked, and its haptic loop is over")]
     Panicked,
@@ -148,4 +153,26 @@ pub trait HapticDevice: Send {
     /// # Errors
     /// The device cannot be written now.
     fn write(&mut self, wrench: Wrench) -> Result<(), DeviceError>;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_tool_can_be_like_is_not_valid() {
+        let at = DeviceSample::at;
+        assert!(at(Vec3::splat(-FARTHEST)).is_valid());
+        for place in [1.01 * FARTHEST, f32::NAN, f32::NEG_INFINITY] {
+            assert!(!at(Vec3::Y * place).is_valid(), "{place}");
+        }
+        let turned = |w: f32| DeviceSample {
+            orientation: Quat::from_xyzw(0.6 * w, 0.0, 0.0, 0.8 * w),
+            ..at(Vec3::ZERO)
+        };
+        assert!([1.0, -1.0, 0.998, 1.002].into_iter().all(|length| turned(length).is_valid()));
+        for length in [0.0, 1e-30, 0.9, 1.1, 1e20, 1e30, f32::INFINITY, f32::NAN] {
+            assert!(!turned(length).is_valid(), "{length}");
+        }
+    }
 }

@@ -51,7 +51,7 @@ impl Motion {
         let mut last = f64::NEG_INFINITY;
         for (index, Keyframe { time, sample }) in keyframes.iter_mut().enumerate() {
             sample.orientation = sample.orientation.normalize();
-            if !(time.is_finite() && sample.is_finite()) {
+            if !(time.is_finite() && sample.is_valid()) {
                 return Err(MotionError::NonFinite { index });
             }
             if *time <= last {
@@ -147,8 +147,11 @@ mod tests {
         assert_eq!(Motion::new(order), Err(MotionError::Order { index: 1 }));
         let broken = [keyframe(f64::NAN, 0.0, 0)];
         assert_eq!(Motion::new(broken), Err(MotionError::NonFinite { index: 0 }));
-        let mut none = keyframe(0.0, 0.0, 0);
-        none.sample.orientation = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0);
-        assert_eq!(Motion::new([none]), Err(MotionError::NonFinite { index: 0 }));
+        for none in [0.0, 1e-30, 1e30, f32::NAN] {
+            let mut none_at_all = keyframe(0.0, 0.0, 0);
+            none_at_all.sample.orientation = Quat::from_xyzw(none, 0.0, 0.0, 0.0);
+            let made = Motion::new([none_at_all]);
+            assert_eq!(made, Err(MotionError::NonFinite { index: 0 }), "{none}");
+        }
     }
 }

@@ -78,7 +78,7 @@ impl<'c, D: HapticDevice> HapticLoop<'c, D> {
         self.time = time;
         let (number, model) = self.end.model();
         let read = self.device.read(time).and_then(|sample| {
-            if sample.is_finite() { Ok(sample) } else { Err(DeviceError::NonFinite) }
+            if sample.is_valid() { Ok(sample) } else { Err(DeviceError::InvalidPose) }
         });
         let wrench = match &read {
             Ok(sample) => self.law.step(time, sample, (number, &model)),
