@@ -170,6 +170,37 @@ fn rates_are_the_devices() {
     }
 }
 
+#[test]
+fn settings_are_positive_numbers() {
+    let settings = ForceSettings::default();
+    let wrong = [
+        (ForceSettings { max_step: -0.5, ..settings }, "the greatest step of the force", "-0.5"),
+        (
+            ForceSettings { max_torque_step: f32::NAN, ..settings },
+            "the greatest step of the torque",
+            "NaN",
+        ),
+        (ForceSettings { entry: -1.0, ..settings }, "the time in which a model comes in", "-1"),
+        (
+            ForceSettings { timeout: f64::NAN, ..settings },
+            "the time after which forces fade",
+            "NaN",
+        ),
+        (ForceSettings { fade: f64::INFINITY, ..settings }, "the time in which forces fade", "inf"),
+        (ForceSettings { max_damping: -2.0, ..settings }, "the greatest damping", "-2"),
+    ];
+    for (settings, what, value) in wrong {
+        let mut link = HapticLink::new();
+        let (end, _) = link.split();
+        let device = Faulty { reads: Arc::default(), writes: Arc::default() };
+        scope(|scope| {
+            let spawned = HapticThread::spawn(scope, device, end, settings, RATE);
+            let error = spawned.map(|_| ()).expect_err("no such settings").to_string();
+            assert_eq!(error, format!("{what} is {value}, which must be a number from 0 on"));
+        });
+    }
+}
+
 /// A device at which something has gone wrong.
 struct Astray;
 

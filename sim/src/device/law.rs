@@ -1,6 +1,7 @@
 //! The force law of the haptic loop: what a device exerts, tick by tick.
 
 use glam::Vec3;
+use thiserror::Error;
 
 use super::entry::{SmoothEntry, limited_step};
 use super::figures::Forces;
@@ -30,6 +31,35 @@ pub struct ForceSettings {
     /// off. Usually 20: a fifth of m/T for a device of 0.1 kg at 1 kHz, beyond which damping by the
     /// speed of the tick before is itself unstable.
     pub max_damping: f64,
+}
+
+/// Settings that are none.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[error("{what} is {value}, which must be a number from 0 on")]
+pub struct SettingsError {
+    /// What is wrong.
+    pub what: &'static str,
+    /// What it is.
+    pub value: f64,
+}
+
+impl ForceSettings {
+    /// The settings themselves if every one of them is a finite number from 0 on.
+    ///
+    /// # Errors
+    /// [`SettingsError`] if one is not.
+    pub fn checked(self) -> Result<Self, SettingsError> {
+        let values = [
+            ("the greatest step of the force", self.max_step.into()),
+            ("the greatest step of the torque", self.max_torque_step.into()),
+            ("the time in which a model comes in", self.entry),
+            ("the time after which forces fade", self.timeout),
+            ("the time in which forces fade", self.fade),
+            ("the greatest damping", self.max_damping),
+        ];
+        let wrong = values.into_iter().find(|&(_, value)| !(value.is_finite() && value >= 0.0));
+        wrong.map_or(Ok(self), |(what, value)| Err(SettingsError { what, value }))
+    }
 }
 
 impl Default for ForceSettings {
@@ -84,7 +114,8 @@ struct Blind {
 }
 
 impl ForceLaw {
-    /// A law that exerts nothing until a model comes.
+    /// A law that exerts nothing until a model comes. The settings are used as they are:
+    /// [`ForceSettings::checked`] says whether they are any.
     #[must_use]
     pub fn new(device: DeviceDescription, settings: ForceSettings) -> Self {
         Self {
@@ -198,6 +229,9 @@ impl ForceLaw {
     /// Such a force must not catch up while the tool is on its way out, or it would give back more than it
     /// took: who calls lets the model come in anew from what is exerted.
     fn exert(&mut self, wanted: Wrench) -> bool {
+        // A device that was once told what is no number would never be told anything else.
+        let is_sound = wanted.force.is_finite() && wanted.torque.is_finite();
+        let wanted = if is_sound { wanted } else { Wrench::default() };
         let most = wanted.force.clamp_length_max(self.device.max_force);
         let force = limited_step(self.wrench.force, most, self.settings.max_step);
         let torque = wanted.torque.clamp_length_max(self.device.max_torque);
@@ -308,6 +342,29 @@ mod tests {
             let stalled = forces(4.0, 6.0, 4.0);
             let stuck = stalled.iter().skip((0.4 * rate) as usize + 5).find(|&&force| force > 0.0);
             assert!(smooth(&stalled) && stuck.is_none(), "{case}: {stalled:?}");
+        }
+    }
+
+    /// What passes for a model and is nonsense is felt as some force within bounds, and what comes after it as
+    /// ever.
+    #[test]
+    fn no_model_makes_it_exert_what_is_no_number() {
+        let great = Vec3::splat(f32::MAX);
+        let skew = Mat3::from_cols(Vec3::Y * -2e38, Vec3::X * -2e38, Vec3::ZERO);
+        let nonsense = [
+            LocalModel { gradient: skew, ..LocalModel::FREE },
+            LocalModel { force: great, pull: great, torque: great, ..WALL },
+            LocalModel { position: great, ..WALL },
+        ];
+        for model in nonsense {
+            let mut law = law();
+            let inside = DeviceSample::at(Vec3::Y * -2e-3);
+            for tick in 1..50 {
+                let wrench = law.step(tick as f64 * PERIOD, &inside, (tick, &model));
+                assert!(wrench.force.is_finite() && wrench.torque.is_finite(), "{model:?}");
+            }
+            let forces = rest(&mut law, 50, 400);
+            assert!((forces[349] - 2.0).abs() < 1e-3 && smooth(&forces), "{model:?}: {forces:?}");
         }
     }
 

@@ -135,9 +135,10 @@ impl Bounded {
         &self.model
     }
 
-    /// In newtons; at most the device's greatest force.
+    /// In newtons; at most the device's greatest force. A force beyond all numbers is none.
     pub(super) fn force_at(&self, position: Vec3) -> Vec3 {
-        self.model.force_at(position).clamp_length_max(self.max_force)
+        let force = self.model.force_at(position);
+        if force.is_finite() { force.clamp_length_max(self.max_force) } else { Vec3::ZERO }
     }
 
     /// The energy stored at a place, in joules: fᵀK⁻¹f/2 for the force f of Eq. 1. Where the force is
@@ -162,7 +163,8 @@ struct Spring {
 
 impl Spring {
     fn new(force: Vec3, gradient: Mat3, most: f64) -> Self {
-        let symmetric = (gradient + gradient.transpose()) * 0.5;
+        // In this order, since the sum of the greatest numbers is not finite.
+        let symmetric = gradient * 0.5 + gradient.transpose() * 0.5;
         let (values, vectors) = principal(symmetric.as_dmat3());
         let stiffness = (-values).clamp(DVec3::ZERO, DVec3::splat(most));
         let inverse = |k: f64| if k < LEAST_STIFFNESS { 0.0 } else { 1.0 / k };
@@ -260,6 +262,28 @@ mod tests {
             let work = (0..steps).map(|step| force(step) * depth / f64::from(steps)).sum::<f64>();
             let stored = bounded.energy_at(at(0.0));
             assert!((work - stored).abs() < 1e-3 * stored, "{work} of {stored} J at {depth} m");
+        }
+    }
+
+    /// Of numbers that a model may have, as great as they may be, none makes a force that is no number.
+    #[test]
+    fn the_greatest_numbers_make_forces() {
+        let free = LocalModel::FREE;
+        let skew = Mat3::from_cols(Vec3::Y * -2e38, Vec3::X * -2e38, Vec3::ZERO);
+        let great = Vec3::splat(f32::MAX);
+        let models = [
+            LocalModel { gradient: skew, normal: Some(Vec3::Y), ..free },
+            LocalModel { pull_gradient: skew, force: Vec3::Y, ..free },
+            LocalModel { force: great, pull: great, torque: great, ..free },
+            LocalModel { position: great, ..wall(1_000.0) },
+            LocalModel { normal: Some(great), force: -great, ..wall(f32::MAX) },
+        ];
+        for model in models {
+            let bounded =
+                Bounded::new(model.checked().expect("finite"), &SimulatedDevice::DESCRIPTION);
+            for place in [Vec3::ZERO, Vec3::splat(0.1), Vec3::splat(-0.1)] {
+                assert!(bounded.force_at(place).is_finite(), "{model:?} at {place}");
+            }
         }
     }
 

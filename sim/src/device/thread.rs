@@ -10,7 +10,7 @@ use std::{fmt, io};
 use thiserror::Error;
 
 use super::figures::Ticks;
-use super::law::{ForceLaw, ForceSettings};
+use super::law::{ForceLaw, ForceSettings, SettingsError};
 use super::link::{LoopEnd, ToolState};
 use super::priority::Priority;
 use super::{DeviceError, DeviceSample, HapticDevice, Wrench};
@@ -39,6 +39,9 @@ pub enum LoopError {
         /// The greatest rate, in hertz.
         most: f64,
     },
+    /// Settings that are none.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
     /// The system gives no thread.
     #[error("no thread for the haptic loop: {0}")]
     Thread(#[from] io::Error),
@@ -59,7 +62,7 @@ pub struct HapticLoop<'c, D> {
 }
 
 impl<'c, D: HapticDevice> HapticLoop<'c, D> {
-    /// A loop that has not ticked.
+    /// A loop that has not ticked. The settings are used as they are: [`ForceSettings::checked`].
     pub fn new(device: D, end: LoopEnd<'c>, settings: ForceSettings) -> Self {
         let law = ForceLaw::new(device.description(), settings);
         let sample = DeviceSample::at(glam::Vec3::ZERO);
@@ -117,7 +120,8 @@ impl<'scope> HapticThread<'scope> {
     /// Starts a loop at `rate` hertz, usually [`RATE`].
     ///
     /// # Errors
-    /// A rate that is not the device's, is below [`MIN_RATE`] or above [`MAX_RATE`], a thread that cannot be had.
+    /// A rate that is not the device's, is below [`MIN_RATE`] or above [`MAX_RATE`]; settings that are none; a thread
+    /// that cannot be had.
     pub fn spawn<D: HapticDevice + 'scope>(
         scope: &'scope Scope<'scope, '_>,
         device: D,
@@ -131,6 +135,7 @@ impl<'scope> HapticThread<'scope> {
         if !(least..=most).contains(&rate) {
             return Err(LoopError::Rate { rate, device: description.name, least, most });
         }
+        let settings = settings.checked()?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let (tell, told) = mpsc::sync_channel(1);
