@@ -213,6 +213,21 @@ fn lies_in_its_place_until_it_is_pulled() {
     assert!(look(&executor, |piece, _| piece.is_seated()));
 }
 
+/// A hand however stiff pulls with its strength, and so lifts a piece from its place.
+#[test]
+fn is_lifted_by_any_stiffness() {
+    for stiffness in [1e5, 1e22, f32::MAX] {
+        let pose = Pose::from_translation(Vec3::new(0.0, 0.0, 0.1));
+        let mut executor = scene(flap(pose), false, vec![], 9.81);
+        let start = center(&executor);
+        post(&executor, Grasp { by: TOOL, point: start, radius: 3e-3, stiffness, strength: 20.0 });
+        post(&executor, Hold { by: TOOL, position: start + Vec3::Z * 0.03 });
+        run(&mut executor, 60);
+        let off = (center(&executor) - start - Vec3::Z * 0.03).length();
+        assert!(off < 1e-4, "{off} m off with {stiffness} N/m");
+    }
+}
+
 #[test]
 fn a_piece_let_go_elsewhere_falls() {
     let pose = Pose::from_translation(Vec3::new(0.0, 0.0, 0.1));

@@ -61,7 +61,8 @@ impl Hand {
 
     /// Its force on a piece at rest, in newtons.
     fn force(&self, volume: &Volume) -> Vec3 {
-        (self.way(volume) * self.stiffness).clamp_length_max(self.strength)
+        // In this order, since a way times any stiffness may have no finite length.
+        self.way(volume).clamp_length_max(self.strength / self.stiffness) * self.stiffness
     }
 
     /// Pulls for a frame of `time` seconds, by one implicit step, which any stiffness bears: a soft constraint
