@@ -45,7 +45,9 @@ impl Volume {
         for way in (first..last).map(|number| (number + 1) as f32 * step) {
             let density = self.density_at(origin + direction * way);
             if density >= 0.5 {
-                return Some(way - step * (density - 0.5) / (density - before));
+                let met = way - step * (density - 0.5) / (density - before);
+                // The last step may go on beyond the end.
+                return (met <= reach).then_some(met);
             }
             before = density;
         }
@@ -132,6 +134,23 @@ mod tests {
             assert!((near.expect("it points at the middle") - 0.48).abs() < 1e-3, "{near:?}");
             assert_eq!(volume.cast(origin, -direction, f32::INFINITY), None);
             assert_eq!(volume.cast(CENTER - direction * 1e30, direction, f32::INFINITY), None);
+        }
+    }
+
+    /// Also where it would be met before the step that passes the end of the ray ends.
+    #[test]
+    fn bone_is_met_within_reach_only() {
+        let [_, _, bone] = balls();
+        let volume = bone.as_volume().expect("bone");
+        for direction in [Vec3::X, Vec3::NEG_Y, Vec3::new(0.6, 0.0, -0.8)] {
+            for shift in [0.0, 3e-4, 5e-4, 8e-4] {
+                let origin = CENTER - direction * (0.5 + shift);
+                let way = volume.cast(origin, direction, 1.0).expect("it points at the middle");
+                for gap in [1e-5, 3e-4, 9e-4] {
+                    assert_eq!(volume.cast(origin, direction, way - gap), None, "{gap} m short");
+                }
+                assert_eq!(volume.cast(origin, direction, way + 1e-5), Some(way));
+            }
         }
     }
 
