@@ -4,7 +4,7 @@ mod common;
 
 use std::any::Any;
 
-use common::{no_rules, run, serial};
+use common::{no_rules, point, run, serial, springs};
 use dualframe_sim::behavior::drill::{Bit, Burr, Erode};
 use dualframe_sim::behavior::piece::{BONE_DENSITY, Piece};
 use dualframe_sim::behavior::{Bone, Fixed, Grasp, Hold, LetGo};
@@ -15,6 +15,7 @@ use dualframe_sim::message::Message;
 use dualframe_sim::object::{Group, Object, ObjectId};
 use dualframe_sim::scene::Scene;
 use dualframe_sim::stages::Stages;
+use dualframe_sim::state::object_hash;
 use glam::{Quat, Vec3};
 use parry3d::math::Pose;
 
@@ -259,26 +260,47 @@ fn is_not_pressed_into_bone() {
     assert!(lowest(&executor) > 5e-3, "{}", lowest(&executor));
 }
 
+/// Scenery with the shape of a plate.
+fn scenery(id: u32, pose: Pose) -> Object {
+    Object::new(ObjectId(id), Group(2), Geometry::Volume(flap(pose)), Fixed)
+}
+
+/// The states of all but the piece, none of which may be quarantined.
+fn states_of_others(executor: &SerialExecutor) -> Vec<(ObjectId, u64)> {
+    let mut states = Vec::new();
+    executor.visit(&mut |object| {
+        assert_eq!(object.quarantined(), None, "{:?}", object.id());
+        if object.id() != ObjectId(0) {
+            states.push((object.id(), object_hash(object)));
+        }
+    });
+    states.sort_unstable();
+    states
+}
+
 #[test]
 fn scenery_and_bone_ignore_hands() {
-    let mut other = floor();
-    other.behavior = Box::new(Fixed);
-    let mut executor = scene(flap(Pose::from_translation(Vec3::Z)), false, vec![other], 9.81);
-    for id in [1, 5] {
-        let message = LetGo { by: TOOL };
-        executor.mailbox().post(ObjectId(id), Message::Custom(Box::new(message)));
-        let grasp =
-            Grasp { by: TOOL, point: Vec3::ZERO, radius: 1.0, stiffness: 1.0, strength: 1.0 };
-        executor.mailbox().post(ObjectId(id), Message::Custom(Box::new(grasp)));
+    let others = vec![floor(), scenery(2, Pose::IDENTITY)];
+    let mut executor = scene(flap(Pose::from_translation(Vec3::Z)), false, others, 9.81);
+    let before = states_of_others(&executor);
+    for id in [1, 2] {
+        let post = |message| executor.mailbox().post(ObjectId(id), Message::Custom(message));
+        post(Box::new(LetGo { by: TOOL }));
+        let (point, radius, stiffness, strength) = (Vec3::ZERO, 1.0, 1.0, 1.0);
+        post(Box::new(Grasp { by: TOOL, point, radius, stiffness, strength }));
+        post(Box::new(Hold { by: TOOL, position: Vec3::Y }));
     }
     run(&mut executor, 3);
+    assert_eq!(states_of_others(&executor), before);
     assert!(look(&executor, |piece, _| piece.holders().next().is_none()));
 }
 
 #[test]
 fn is_drilled_like_any_bone() {
     let pose = Pose::from_parts(Vec3::new(0.1, 0.2, 0.3), turned());
-    let mut executor = scene(flap(pose), false, vec![floor()], 9.81);
+    let others = vec![scenery(1, pose), point(2, springs(1.0))];
+    let mut executor = scene(flap(pose), false, others, 0.0);
+    let untouched = states_of_others(&executor);
     let weight = |executor: &SerialExecutor| {
         look(executor, |piece, volume| {
             let densities: u64 = volume.densities().map(u64::from).sum();
@@ -289,12 +311,13 @@ fn is_drilled_like_any_bone() {
     let burr = Burr { bit: Bit::BURR, center, axis: Vec3::Z, spin: 3e3, side: None };
     for _ in 0..20 {
         // What is scenery, or no bone at all, ignores it.
-        for id in [0, 5] {
+        for id in 0..3 {
             let erode = Erode { burr, load: 10.0 };
             executor.mailbox().post(ObjectId(id), Message::Custom(Box::new(erode)));
         }
         run(&mut executor, 1);
     }
+    assert_eq!(states_of_others(&executor), untouched);
     let (removed, left, lighter) = weight(&executor);
     assert!(removed > 10_000 && removed + left == whole, "{removed} of {whole}");
     let expected = mass * left as f32 / whole as f32;
