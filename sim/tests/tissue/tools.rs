@@ -71,6 +71,22 @@ fn scraping_breaks_the_pins_in_a_ball() {
 }
 
 #[test]
+fn radii_that_are_no_numbers_are_ignored() {
+    let (mesh, tissue) = patch(9, scalp(), 8);
+    let (point, stiffness, strength) =
+        (mesh.positions.get(40).expect("a node"), 1e3, f32::INFINITY);
+    let pins = vec![Pin { node: 40, point, stiffness, strength }];
+    let mut executor = alone(mesh, tissue.with_pins(pins).expect("a pin"), Vec3::ZERO);
+    for radius in [f32::INFINITY, f32::NAN, -1.0] {
+        tell(&executor, Scrape { center: point, radius });
+        tell(&executor, Grasp { by: TOOL, point, radius, stiffness, strength });
+    }
+    run(&mut executor, 1);
+    assert_eq!(look(&executor, |tissue, _| tissue.pins().len()), 1);
+    assert_eq!(look(&executor, |tissue, _| tissue.held_nodes(TOOL)), 0);
+}
+
+#[test]
 fn the_engines_messages() {
     let (mesh, tissue) = patch(5, scalp(), 8);
     let mut executor = alone(mesh, tissue, Vec3::NEG_Z * GRAVITY);

@@ -52,7 +52,8 @@ impl Holdable for Tissue {
     fn take(&mut self, geometry: &Geometry, grasp: &Grasp) {
         let Some(mesh) = geometry.as_mesh() else { return };
         let &Grasp { by, point, radius, stiffness, strength } = grasp;
-        if !(point.is_finite() && radius >= 0.0 && stiffness > 0.0 && strength >= 0.0) {
+        let somewhere = point.is_finite() && radius.is_finite() && radius >= 0.0;
+        if !(somewhere && stiffness > 0.0 && strength >= 0.0) {
             return;
         }
         let near = |&(_, offset): &(u32, Vec3)| offset.length() <= radius;
@@ -75,7 +76,9 @@ impl Holdable for Tissue {
 
 impl Custom for Scrape {
     fn process(&self, object: &mut Object) {
-        let Some((tissue, mesh)) = tissue(object) else { return };
+        let Some((tissue, mesh)) = tissue(object).filter(|_| self.radius.is_finite()) else {
+            return;
+        };
         let is_off = |node: u32| {
             let position = mesh.positions.get(node as usize);
             position.is_some_and(|position| (position - self.center).length() <= self.radius)
