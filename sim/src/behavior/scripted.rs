@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use super::{Behavior, Input};
 use crate::geometry::Geometry;
+use crate::geometry::rotation::between;
 
 /// A place on a scripted path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,21 +68,6 @@ impl Scripted {
         let position = from.position + (to.position - from.position) * share;
         Pose::from_parts(position, between(from.rotation, to.rotation, share))
     }
-}
-
-/// Normalised linear interpolation along the shorter arc.
-fn between(from: Quat, to: Quat, share: f32) -> Quat {
-    if from == to {
-        return from;
-    }
-    // Component by component: the quaternion type's own sums differ between vector units.
-    let (a, mut b) = (from.to_array(), to.to_array());
-    if (0..4).map(|i| a[i] * b[i]).sum::<f32>() < 0.0 {
-        b = b.map(|component| -component);
-    }
-    let mixed: [f32; 4] = std::array::from_fn(|i| a[i] + (b[i] - a[i]) * share);
-    let length = mixed.iter().map(|component| component * component).sum::<f32>().sqrt();
-    Quat::from_array(mixed.map(|component| component / length))
 }
 
 impl Behavior for Scripted {

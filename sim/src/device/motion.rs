@@ -5,7 +5,8 @@ use std::sync::Arc;
 use glam::Vec3;
 use thiserror::Error;
 
-use super::{DeviceDescription, DeviceError, DeviceSample, HapticDevice, Wrench};
+use super::{DeviceDescription, DeviceError, DeviceSample, FARTHEST, HapticDevice, Wrench};
+use crate::geometry::rotation::{between, unit};
 
 /// Where a tool is at one moment of a script.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,9 +23,15 @@ pub enum MotionError {
     /// There is none.
     #[error("a motion without keyframes")]
     Empty,
-    /// A time, a place or an orientation that is not finite, or an orientation of no length.
+    /// A time, a place or an orientation that is not finite, or an orientation of no length, or of one beyond numbers.
     #[error("keyframe {index} has a number that is not finite, or no orientation")]
     NonFinite {
+        /// The keyframe, from 0.
+        index: usize,
+    },
+    /// A place where no hand is.
+    #[error("keyframe {index} is more than {FARTHEST} m away along an axis")]
+    TooFar {
         /// The keyframe, from 0.
         index: usize,
     },
@@ -45,14 +52,18 @@ impl Motion {
     /// A motion through some keyframes, in order of time. Orientations are taken to unit length.
     ///
     /// # Errors
-    /// [`MotionError`]: no keyframe, one out of order, or one with a number that is not finite.
+    /// [`MotionError`]: no keyframe, one out of order, one too far away, or one with a number that is not finite.
     pub fn new(keyframes: impl IntoIterator<Item = Keyframe>) -> Result<Self, MotionError> {
         let mut keyframes: Vec<_> = keyframes.into_iter().collect();
         let mut last = f64::NEG_INFINITY;
         for (index, Keyframe { time, sample }) in keyframes.iter_mut().enumerate() {
-            sample.orientation = sample.orientation.normalize();
-            if !(time.is_finite() && sample.is_valid()) {
+            sample.orientation = unit(sample.orientation.to_array());
+            let turned = DeviceSample { position: Vec3::ZERO, ..*sample };
+            if !(time.is_finite() && sample.position.is_finite() && turned.is_valid()) {
                 return Err(MotionError::NonFinite { index });
+            }
+            if !sample.is_valid() {
+                return Err(MotionError::TooFar { index });
             }
             if *time <= last {
                 return Err(MotionError::Order { index });
@@ -65,7 +76,7 @@ impl Motion {
     /// A tool that rests.
     ///
     /// # Errors
-    /// [`MotionError::NonFinite`].
+    /// [`MotionError::NonFinite`], [`MotionError::TooFar`].
     pub fn at_rest(position: Vec3) -> Result<Self, MotionError> {
         Self::new([Keyframe { time: 0.0, sample: DeviceSample::at(position) }])
     }
@@ -81,7 +92,7 @@ impl Motion {
         let share = ((time - from.time) / (to.time - from.time)) as f32;
         DeviceSample {
             position: from.sample.position.lerp(to.sample.position, share),
-            orientation: from.sample.orientation.lerp(to.sample.orientation, share),
+            orientation: between(from.sample.orientation, to.sample.orientation, share),
             buttons: from.sample.buttons,
         }
     }
@@ -124,6 +135,7 @@ mod tests {
     use glam::Quat;
 
     use super::*;
+    use crate::behavior::{self as scripted, Scripted};
 
     fn keyframe(time: f64, x: f32, buttons: u32) -> Keyframe {
         let orientation = Quat::from_rotation_z(x);
@@ -152,6 +164,34 @@ mod tests {
             none_at_all.sample.orientation = Quat::from_xyzw(none, 0.0, 0.0, 0.0);
             let made = Motion::new([none_at_all]);
             assert_eq!(made, Err(MotionError::NonFinite { index: 0 }), "{none}");
+        }
+        let mut far = [keyframe(0.0, 0.0, 0), keyframe(1.0, 0.0, 0)];
+        far[1].sample.position.z = 150.0;
+        let error = Motion::new(far).expect_err("no hand is there");
+        assert_eq!(error.to_string(), "keyframe 1 is more than 100 m away along an axis");
+    }
+
+    /// A tool's orientations are part of a simulation's state: the same bits as of anything scripted, and so on
+    /// every machine.
+    #[test]
+    fn orientations_are_those_of_scripted_objects() {
+        let rotations = [[0.1, -0.7, 0.3, 0.4], [0.9, 0.2, -0.1, -0.6], [-0.3, 0.5, 0.8, 0.2]];
+        let mut keyframes = [0, 1, 2].map(|second| keyframe(f64::from(second), 0.0, 0));
+        for (keyframe, rotation) in keyframes.iter_mut().zip(rotations) {
+            keyframe.sample.orientation = Quat::from_array(rotation);
+        }
+        let motion = Motion::new(keyframes).expect("in order");
+        let scripted = (0..3_u64).map(|second| scripted::Keyframe {
+            frame: 64 * second,
+            position: Vec3::ZERO,
+            rotation: motion.at(second as f64).orientation,
+        });
+        let scripted = Scripted::new(scripted.collect()).expect("in order");
+        for frame in 0..=128 {
+            let orientation = motion.at(frame as f64 / 64.0).orientation;
+            assert_eq!(orientation, scripted.at(frame).rotation, "frame {frame}");
+            let length: f32 = orientation.to_array().iter().map(|part| part * part).sum();
+            assert!((length - 1.0).abs() < 1e-6, "{length}");
         }
     }
 }

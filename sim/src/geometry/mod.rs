@@ -7,6 +7,7 @@ mod icosphere;
 mod mesh;
 mod ray;
 mod rigid;
+pub(crate) mod rotation;
 mod topology;
 pub(crate) mod union;
 mod vectors;

@@ -5,6 +5,7 @@ use std::hash::Hasher;
 use glam::{DMat3, DVec3, Mat3, Quat, Vec3};
 
 use crate::geometry::Volume;
+use crate::geometry::rotation::unit;
 
 /// The mass of full bone, in kilograms per cubic metre; usually 1,900: cortical bone.
 pub const BONE_DENSITY: f64 = 1_900.0;
@@ -131,9 +132,7 @@ fn turned_on(rotation: Quat, by: Vec3) -> Quat {
     // (half, 1 − |half|²/2) times the rotation.
     let real = 1.0 - 0.5 * half.length_squared();
     let imaginary = half * w + axis * real + half.cross(axis);
-    let turned = [imaginary.x, imaginary.y, imaginary.z, real * w - half.dot(axis)];
-    let length = turned.iter().map(|component| component * component).sum::<f32>().sqrt();
-    Quat::from_array(turned.map(|component| component / length))
+    unit([imaginary.x, imaginary.y, imaginary.z, real * w - half.dot(axis)])
 }
 
 /// Sums over the densities, as whole numbers, and so in any order the same: of the density times 1, the
