@@ -5,8 +5,9 @@ use glam::{DVec3, Vec3};
 use super::motion::Motion;
 use super::{DeviceDescription, DeviceError, DeviceSample, HapticDevice, Wrench};
 
-/// The longest step in which the motion is integrated, in seconds. Usually 20 µs: the stiffest hand on
-/// the lightest device swings at some 300 rad/s, so a step is below a hundredth of a radian.
+/// The longest step in which the motion is integrated, in seconds. Usually 20 µs: the lightest device, of 0.05 kg, in
+/// the stiffest hand, of 500 N/m, on a wall of 5,000 N/m swings at some 330 rad/s, so a step is below a hundredth of a
+/// radian.
 const LONGEST_STEP: f64 = 20e-6;
 
 /// A hand that holds the device: a mass on a spring and a damper, whose other end goes where the hand
