@@ -179,6 +179,8 @@ impl Order {
         if due < self.due.max(self.stop) {
             return Err(Disorder::Letter { due, after: self.due.max(self.stop) });
         }
+        // The last that was taken before the next checkpoint is due in the frame after it.
+        self.checked_until(due, CHECKPOINT_FRAMES + 1)?;
         self.letters = if due == self.due { self.letters + 1 } else { 1 };
         self.due = due;
         match self.letters <= MAX_LETTERS {
@@ -192,6 +194,7 @@ impl Order {
         if frame < self.stop.max(self.due.saturating_sub(1)) {
             return Err(Disorder::Stop { frame, after: self.stop, due: self.due });
         }
+        self.checked_until(frame, CHECKPOINT_FRAMES)?;
         self.stop_bytes = if frame == self.stop { self.stop_bytes + bytes } else { bytes };
         self.stop = frame;
         if matches!(stop, Stop::Checkpoint(_)) {
@@ -209,10 +212,7 @@ impl Order {
         if frames < least {
             return Err(Disorder::Frames { frames, least });
         }
-        // So that a file can promise no more frames than it has checkpoints for.
-        if frames - self.checkpoint.unwrap_or(0) > CHECKPOINT_FRAMES {
-            return Err(self.unchecked(frames));
-        }
+        self.checked_until(frames, CHECKPOINT_FRAMES)?;
         self.frames = frames;
         if self.due < frames {
             (self.due, self.letters) = (frames, 0);
@@ -228,6 +228,15 @@ impl Order {
         match self.checkpoint == Some(self.frames) {
             true => Ok(()),
             false => Err(self.unchecked(self.frames)),
+        }
+    }
+
+    /// Sees that something is at most `most` frames after a checkpoint: so a file can tell of no more frames than it
+    /// has checkpoints for.
+    fn checked_until(&self, frames: u64, most: u64) -> Result<(), Disorder> {
+        match frames.saturating_sub(self.checkpoint.unwrap_or(0)) <= most {
+            true => Ok(()),
+            false => Err(self.unchecked(frames)),
         }
     }
 

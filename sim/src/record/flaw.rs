@@ -100,7 +100,7 @@ pub enum Disorder {
     /// More frames than a checkpoint apart are not checked, or the last ones are not.
     #[error("of {frames} frames the last checkpoint is {}", told(.checked))]
     Unchecked {
-        /// The number of frames.
+        /// The number of frames that are told of.
         frames: u64,
         /// Those before the last checkpoint, if there is one.
         checked: Option<u64>,

@@ -31,8 +31,8 @@
 //!   - 0, message: number, the object; the message;
 //!   - 1, gravity: 3 floats; 2, time step: float;
 //!   - 3, objects added: bytes;
-//!   - 4, checkpoint: number, how many objects; 8 bytes each, their hashes. The state's hash follows. No F is more
-//!     than 60 frames after the last one, and the last F has one.
+//!   - 4, checkpoint: number, how many objects; 8 bytes each, their hashes. The state's hash follows. Nothing, and
+//!     no F, is more than 60 frames after the last one, or 61 if it is a message; the last F has one.
 //! - End: numbers, of frames, messages, controls, additions and checkpoints.
 //!
 //! A chunk is written about once a second. A file that is cut off or altered is whole up to its first chunk that is not,

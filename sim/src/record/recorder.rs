@@ -165,14 +165,17 @@ impl<W: Write> Recorder<W> {
     /// Writes what was recorded so far, which [`Recorder::run`] does about once a second.
     ///
     /// # Errors
-    /// The recording has failed before, or cannot be written.
+    /// The recording has failed before, or cannot be written, or frames were run without the recorder.
     pub fn write(&mut self, manager: &VeManager) -> Result<(), RecordError> {
         let mut journal = self.journal.lock().unwrap_or_else(PoisonError::into_inner);
         journal.check()?;
-        let payload = journal.close(manager.frame())?;
-        if let Err(error) = self.writer.write(Kind::Events, payload) {
+        let written = match journal.close(manager.frame()) {
+            Ok(payload) => self.writer.write(Kind::Events, payload).map_err(RecordError::from),
+            Err(disorder) => Err(disorder.into()),
+        };
+        if written.is_err() {
             journal.end();
-            return Err(error.into());
+            return written;
         }
         journal.clear();
         self.written = Instant::now();

@@ -156,6 +156,7 @@ const RELEASE: &[u8] = &[1, 4];
 const LETTER: u8 = 0;
 const TIME_STEP: u8 = 2;
 const OBJECTS: u8 = 3;
+const CHECKPOINT: u8 = 4;
 
 #[test]
 fn what_is_not_in_order() {
@@ -176,8 +177,9 @@ fn what_is_not_in_order() {
     );
     assert_eq!(disorder(3, &[(LETTER, 5, RELEASE)]), Disorder::Frames { frames: 3, least: 4 });
     // The next chunk's events come later by so much, but it ends when it did.
-    assert_eq!(disorder(60, &[]), Disorder::Frames { frames: 70, least: 60 + 70 });
-    let twice: &[(u8, u64, &[u8])] = &[(LETTER, u64::MAX, RELEASE), (LETTER, 1, RELEASE)];
+    let checked = (CHECKPOINT, 1, &[0][..]);
+    assert_eq!(disorder(1, &[checked]), Disorder::Frames { frames: 70, least: 1 + 70 });
+    let twice: &[(u8, u64, &[u8])] = &[(LETTER, 1, RELEASE), (LETTER, u64::MAX, RELEASE)];
     let overflow = read(9, twice);
     assert!(matches!(overflow, Err(Flaw::Malformed(Malformed::Value { what: "a frame", .. }))));
     let kind = read(9, &[(9, 0, &[])]);
@@ -192,8 +194,10 @@ fn frames_that_nothing_checks() {
     let unchecked = |file: &[u8]| {
         let mut reader = Reader::new(file).expect("a header");
         match reader.find_map(Result::err).map(|error| error.flaw) {
-            Some(Flaw::Disorder(Disorder::Unchecked { frames, checked })) => (frames, checked),
-            other => panic!("{other:?}"),
+            Some(Flaw::Disorder(Disorder::Unchecked { frames, checked })) => {
+                Some((frames, checked))
+            }
+            _ => None,
         }
     };
     // Up to this frame there is the checkpoint of the first chunk, or none.
@@ -211,10 +215,38 @@ fn frames_that_nothing_checks() {
         unchecked(&chunks)
     };
     for frames in [1, CHECKPOINT_FRAMES, CHECKPOINT_FRAMES + 1, 1 << 63, u64::MAX] {
-        assert_eq!(promising(frames, true), (frames, Some(0)));
-        assert_eq!(promising(frames, false), (frames, None));
+        assert_eq!(promising(frames, true), Some((frames, Some(0))));
+        assert_eq!(promising(frames, false), Some((frames, None)));
     }
-    assert_eq!(promising(0, false), (0, None));
+    assert_eq!(promising(0, false), Some((0, None)));
+    assert_eq!(promising(0, true), None);
+}
+
+#[test]
+fn what_comes_after_frames_that_nothing_checks() {
+    let file = session();
+    let late = |kind: u8, rest: &[u8], frame: u64| {
+        rewritten(&file, |chunk, payload| {
+            if chunk == 2 {
+                payload.truncate(FRAMES);
+                Encoder(payload).byte(kind);
+                Encoder(payload).number(frame);
+                payload.extend_from_slice(rest);
+            }
+        })
+    };
+    let events: [(u8, &[u8], u64); 3] =
+        [(LETTER, RELEASE, 61), (TIME_STEP, &[0; 4], 60), (CHECKPOINT, &[0], 60)];
+    for (kind, rest, last) in events {
+        for frame in [last, last + 1, 1 << 62] {
+            // A replay that believes it does not end.
+            let told =
+                replay(&late(kind, rest, frame)).expect_err("it is not as it was").to_string();
+            let refused =
+                told.contains(&format!("of {frame} frames the last checkpoint is after 0"));
+            assert_eq!(refused, frame > last, "kind {kind}, frame {frame}: {told}");
+        }
+    }
 }
 
 #[test]
