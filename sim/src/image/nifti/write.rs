@@ -80,7 +80,10 @@ pub fn save<V: Voxel>(path: &Path, grid: &Grid, voxels: &[V]) -> Result<(), File
         }
         // Nothing takes the place of a file that is mounted alone.
         if fs::rename(&beside, &place).is_err() {
-            fs::copy(&beside, &place)?;
+            // Permissions stay, which another's file would not have changed.
+            let mut there = File::options().write(true).truncate(true).open(&place)?;
+            io::copy(&mut File::open(&beside)?, &mut there)?;
+            there.sync_all()?;
             fs::remove_file(&beside)?;
         }
         Ok(())
