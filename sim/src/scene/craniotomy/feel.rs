@@ -163,13 +163,16 @@ impl<'c> Feel<'c> {
             self.past.pop_front();
         }
         let mut sample = self.device()?.sample;
-        if self.tool.is_some_and(|tool| tool.push.is_some()) {
+        match self.tool.map(|tool| tool.push) {
             // A drill finds its own way.
-            sample.position += self.shift.unwrap_or_default();
-        } else {
-            for near in &self.bones {
-                sample.position = near.proxy.held_out(sample.position);
+            Some(Some(_)) => sample.position += self.shift.unwrap_or_default(),
+            Some(None) => {
+                for near in &self.bones {
+                    sample.position = near.proxy.held_out(sample.position);
+                }
             }
+            // Nothing holds out what is not there, or not shown.
+            None => {}
         }
         Some(sample)
     }

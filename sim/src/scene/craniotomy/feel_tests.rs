@@ -199,6 +199,11 @@ fn what_is_not_drawn_is_not_felt() {
     let (wrench, sample) = after(40, &ORDERS[0]);
     assert!((wrench.force.z - 2.0).abs() < 0.3, "{wrench:?}");
     assert!((sample.position.z - LID.z).abs() < 2e-4, "{sample:?} is held out");
+    let bones: Vec<_> = ORDERS[0].into_iter().filter(|&id| id != TOOL).collect();
+    let (_, sample) = after(1, &bones);
+    assert_eq!(sample.position, inside, "a tool that is hidden");
+    let (_, sample) = after(1, &ORDERS[0]);
+    assert!((sample.position.z - LID.z).abs() < 2e-4, "{sample:?} is held out again");
     let (_, sample) = after(1, &[TOOL, SKULL]);
     assert_eq!(sample.position, inside);
     let (wrench, _) = after(20, &[TOOL, SKULL]);
