@@ -119,13 +119,16 @@ mod tests {
     #[test]
     fn a_pause_is_no_frame() {
         let mut measure = Measure::new(None, &|| 0);
+        let began = Instant::now();
         measure.start();
         measure.frame(&record(0));
         sleep(PAUSE);
         measure.interrupt();
         measure.frame(&record(1));
-        assert!(measure.seconds() < PAUSE.as_secs_f64(), "{}", measure.seconds());
-        assert!(measure.frame_times.iter().all(|&took| u128::from(took) < PAUSE.as_nanos()));
+        let most = (began.elapsed() - PAUSE).as_secs_f64();
+        for seconds in [measure.seconds(), measure.seconds_of_first(2)] {
+            assert!(seconds <= most, "{seconds} s of {most}");
+        }
     }
 
     #[test]

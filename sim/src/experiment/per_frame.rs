@@ -128,16 +128,14 @@ impl Frames {
             let (name, variance) = (named(*threads), variance(values));
             Some(format!("{name}: median {median:.2}, variance over the frames {variance:.4}. "))
         });
-        let of_rounds = format!(
-            "Each frame's is the median of {} rounds, which varies less than that of one. ",
-            self.outcome.race.rounds
-        );
         Chart {
             name: "fig15-speed-up",
             title: "Speed-up of each frame over one thread".to_owned(),
             x_label: "frame",
             y_label: "speed-up S_p = T_1 / T_p",
-            finding: finding.collect::<String>() + &of_rounds + &marked([&self.outcome]),
+            finding: finding.collect::<String>()
+                + "A frame's is the median over rounds, which varies less than one round's. "
+                + &marked([&self.outcome]),
             paper: "Level, whatever the number of collisions; variance 0.001 to 0.08 with 2 to 6 \
                     threads (§8.2).",
             ..Chart::default()
