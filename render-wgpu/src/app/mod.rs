@@ -137,7 +137,7 @@ fn fail(line: &str, status: u8) -> ExitCode {
     told.status()
 }
 
-/// Text of a file's, or the name of one, that could say more than what is to be said, as it can stand in a line.
+/// Text, which may be a file's or its name, as it can stand in one line: without line breaks and escape codes.
 fn one_line(text: &str) -> String {
     let shown = |letter: char| match letter.is_control() {
         true => letter.escape_default().collect(),

@@ -194,11 +194,7 @@ impl SceneSpec for PatientSpec {
         if !from.flag("a computed tomography")? {
             return Ok(Self { ct: None });
         }
-        let file = from.text()?;
-        if file.len() > MOST_OF_A_PATH {
-            let what = "the length of a file's name";
-            return Err(Malformed::Value { what, value: file.len() as u64 });
-        }
+        let file = from.text_within(MOST_OF_A_PATH, "the length of a file's name")?;
         Ok(Self { ct: Some((file.to_owned(), from.wide()?)) })
     }
 }

@@ -73,20 +73,11 @@ impl Header {
     }
 
     pub(super) fn decode(mut from: Decoder<'_>) -> Result<Self, Malformed> {
-        let engine = name(&mut from, "the length of an engine's version")?;
-        let kind = name(&mut from, "the length of a scene's kind")?;
+        let engine = from.text_within(MOST_OF_A_NAME, "the length of an engine's version")?;
+        let kind = from.text_within(MOST_OF_A_NAME, "the length of a scene's kind")?;
         let scene = from.bytes()?.to_owned();
         from.finish()?;
-        Ok(Self { engine, kind, scene })
-    }
-}
-
-/// A text that is shown to people, and so is short.
-fn name(from: &mut Decoder<'_>, what: &'static str) -> Result<String, Malformed> {
-    let name = from.text()?;
-    match name.len() {
-        ..=MOST_OF_A_NAME => Ok(name.to_owned()),
-        value => Err(Malformed::Value { what, value: value as u64 }),
+        Ok(Self { engine: engine.to_owned(), kind: kind.to_owned(), scene })
     }
 }
 

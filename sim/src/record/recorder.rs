@@ -73,8 +73,8 @@ impl<W: Write> Recorder<W> {
     /// [`CHECKPOINT_FRAMES`], and writes what was recorded.
     ///
     /// # Errors
-    /// The executor cannot go on, or what was recorded cannot be written, or frames were run without the recorder, by
-    /// more than a checkpoint is from the next. Frames may be left to do then:
+    /// The executor cannot go on, or what was recorded cannot be written, or frames were run without the recorder, so
+    /// that the last checkpoint is more than [`CHECKPOINT_FRAMES`] ago. Frames may be left to do then:
     /// [`VeManager::frame`] says how far it came.
     pub fn run(
         &mut self,
@@ -165,7 +165,7 @@ impl<W: Write> Recorder<W> {
     /// Writes what was recorded so far, which [`Recorder::run`] does about once a second.
     ///
     /// # Errors
-    /// The recording has failed before, or cannot be written, or frames were run without the recorder.
+    /// The recording has failed before, or cannot be written, or frames were run without the recorder, as in [`Recorder::run`].
     pub fn write(&mut self, manager: &VeManager) -> Result<(), RecordError> {
         let mut journal = self.journal.lock().unwrap_or_else(PoisonError::into_inner);
         journal.check()?;

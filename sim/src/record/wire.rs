@@ -229,6 +229,18 @@ impl<'a> Decoder<'a> {
         std::str::from_utf8(self.bytes()?).map_err(|_| Malformed::Text)
     }
 
+    /// A text of at most so many bytes, as one that is shown to people should be; `what` is what its length is of.
+    ///
+    /// # Errors
+    /// As [`Decoder::text`], or it is longer.
+    pub fn text_within(&mut self, most: usize, what: &'static str) -> Result<&'a str, Malformed> {
+        let text = self.text()?;
+        match text.len() {
+            length if length <= most => Ok(text),
+            length => Err(Malformed::Value { what, value: length as u64 }),
+        }
+    }
+
     /// Sees that nothing is left.
     ///
     /// # Errors
