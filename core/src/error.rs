@@ -46,8 +46,9 @@ pub struct TableFull {
     pub capacity: usize,
     /// Of interactions and contacts: what it would have had to hold for all that was asked of it so far in this
     /// frame. The last such error of a frame names the capacity needed, or less where smaller requests, of
-    /// contacts, still found room after it. Of letters, tokens and readers, which are given back at any time: one
-    /// more than there are.
+    /// contacts, still found room after it; memory takes twice that, for two frames. Of letters, tokens and readers,
+    /// which are given back at any time: one more than there are. Of units: one more than the greatest number asked
+    /// for; and at setup, as of queues, what was handed over or what is needed for the rest.
     pub needed: usize,
 }
 
@@ -104,6 +105,30 @@ impl From<TableFull> for SetupError {
         Self::Table(full)
     }
 }
+
+/// The renderer was not left to all workers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NotShared {
+    /// The render tokens that there are; all of them must be free, and there must be one.
+    pub tokens: u32,
+}
+
+impl fmt::Display for NotShared {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.tokens {
+            0 => f.write_str("a pipeline without a render token shares no renderer"),
+            1 => f.write_str("the render token is out, or the renderer is shared already"),
+            tokens => {
+                write!(
+                    f,
+                    "of {tokens} render tokens some are out, or the renderer is shared already"
+                )
+            }
+        }
+    }
+}
+
+impl ::core::error::Error for NotShared {}
 
 /// Frames that were let run have not all been swapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

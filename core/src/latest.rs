@@ -6,9 +6,11 @@
 //! `swap`, learns how many it must see leave before it may use the old slot again. Haptics use it
 //! (§6.3): the device loop reads force and gradient at its own rate, the pipeline at its own.
 
+use ::core::mem::MaybeUninit;
+
 use crate::error::{Table, TableFull};
 use crate::storage::at;
-use crate::sync::{Atomic, Cell, seeded, site};
+use crate::sync::{Atomic, Cell, const_fn, seeded, site};
 
 const INDEX_BITS: u32 = 8;
 const INDEX: u32 = (1 << INDEX_BITS) - 1;
@@ -24,6 +26,14 @@ struct Slot<T> {
     left: Atomic,
 }
 
+impl<T> Slot<T> {
+    const_fn! {
+        const fn new(value: T) -> Self {
+            Self { value: Cell::new(value), entered: Atomic::new(0), left: Atomic::new(0) }
+        }
+    }
+}
+
 /// The cell, with `SLOTS - 2` readers at most; `SLOTS` is 3 to 256.
 #[derive(Debug)]
 pub struct Latest<T, const SLOTS: usize> {
@@ -36,15 +46,31 @@ pub struct Latest<T, const SLOTS: usize> {
 impl<T: Copy + Send + Sync, const SLOTS: usize> Latest<T, SLOTS> {
     const SLOTS_FIT: () = assert!(SLOTS >= 3 && SLOTS <= 256, "3 to 256 slots");
 
-    /// A cell that holds `value` until the first publication.
-    pub fn new(value: T) -> Self {
-        let () = Self::SLOTS_FIT;
-        let slot =
-            |_| Slot { value: Cell::new(value), entered: Atomic::new(0), left: Atomic::new(0) };
-        Self {
-            slots: ::core::array::from_fn(slot),
-            newest: Atomic::new(0),
-            readers: Atomic::new(0),
+    const_fn! {
+        /// A cell that holds `value` until the first publication; also in a `static`:
+        ///
+        /// ```
+        /// use dualframe_core::latest::Latest;
+        /// use dualframe_core::storage::Static;
+        ///
+        /// static FORCE: Static<Latest<f32, 3>> = Static::new(Latest::new(0.0));
+        ///
+        /// let (mut writer, readers) = FORCE.take().expect("nobody has it").split();
+        /// let mut reader = readers.reader().expect("one reader");
+        /// writer.publish(1.5);
+        /// assert_eq!(reader.read(), 1.5);
+        /// ```
+        pub const fn new(value: T) -> Self {
+            let () = Self::SLOTS_FIT;
+            let mut slots = [const { MaybeUninit::uninit() }; SLOTS];
+            let mut index = 0;
+            while index < SLOTS {
+                slots[index] = MaybeUninit::new(Slot::new(value));
+                index += 1;
+            }
+            // SAFETY: all of them are there, and an array of `MaybeUninit` has the layout of one without.
+            let slots = unsafe { (&raw const slots).cast::<[Slot<T>; SLOTS]>().read() };
+            Self { slots, newest: Atomic::new(0), readers: Atomic::new(0) }
         }
     }
 

@@ -2,7 +2,7 @@
 //! host may do with them. What a work unit does is in `protocol.rs`.
 
 use crate::environment::Environment;
-use crate::error::{SetupError, StillRunning, Table, TableFull};
+use crate::error::{NotShared, SetupError, StillRunning, Table, TableFull};
 use crate::frame::{Entry, Frame, Window};
 use crate::inbox::{From, Rejected};
 use crate::probe::NoProbe;
@@ -111,17 +111,15 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     /// A render token for `renderer`.
     ///
     /// # Errors
-    /// The renderer back, and the number of tokens there are, if all are out.
+    /// The renderer back, and the number of tokens there are, if all are out; a shared renderer has them all.
     pub fn token(
         &self,
         renderer: E::Renderer,
     ) -> Result<Token<'_, E::Renderer>, (E::Renderer, TableFull)> {
-        self.office.issue(renderer).map_err(|renderer| (renderer, self.no_token_left()))
-    }
-
-    fn no_token_left(&self) -> TableFull {
         let capacity = self.config.tokens as usize;
-        TableFull { table: Table::Tokens, capacity, needed: capacity.saturating_add(1) }
+        let needed = capacity.saturating_add(1);
+        let full = TableFull { table: Table::Tokens, capacity, needed };
+        self.office.issue(renderer).map_err(|renderer| (renderer, full))
     }
 
     /// Leaves `renderer` to all workers instead of giving tokens to some: whoever has updated a unit renders it too,
@@ -130,12 +128,13 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     ///
     /// # Errors
     /// The renderer back, and the number of tokens there are, if any is out or there is none.
-    pub fn share(&mut self, renderer: E::Renderer) -> Result<(), (E::Renderer, TableFull)>
+    pub fn share(&mut self, renderer: E::Renderer) -> Result<(), (E::Renderer, NotShared)>
     where
         E::Renderer: Send,
     {
-        if !self.office.close(self.config.tokens) {
-            return Err((renderer, self.no_token_left()));
+        let tokens = self.config.tokens;
+        if !self.office.close(tokens) {
+            return Err((renderer, NotShared { tokens }));
         }
         self.shared.offer(renderer);
         Ok(())

@@ -9,7 +9,7 @@ pub trait Probe {
     #[inline]
     fn begin(&mut self, _work: Work, _frame: Frame) {}
 
-    /// The worker is done with `work`, its outputs passed on.
+    /// The worker is done with `work`, its outputs passed on. Not told where a callback panicked.
     #[inline]
     fn end(&mut self, _work: Work, _frame: Frame) {}
 }

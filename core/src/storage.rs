@@ -13,7 +13,10 @@ use crate::unit::{NONE, UnitId};
 /// Memory of one unit and what the protocol knows of it. Units have cache lines of their own, and what
 /// others write of a unit is side by side in the first.
 #[derive(Debug)]
-#[repr(C, align(128))]
+#[repr(C)]
+// Two lines where they are fetched in pairs.
+#[cfg_attr(any(target_arch = "x86_64", target_arch = "aarch64"), repr(align(128)))]
+#[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), repr(align(64)))]
 pub struct UnitSlot<O> {
     /// What has to happen before the unit's next update: its interactions, the opening of the
     /// frame, and its rendering in the frame before; and the list of the interactions.
@@ -160,7 +163,8 @@ pub struct Memory<'m, E: Environment> {
     /// One for each unit, with its object.
     pub units: &'m mut [UnitSlot<E::Object>],
     /// `Pairwise`: the modelled interactions. `Spatial`: spare ones, twice as many as pairs of
-    /// units (and units with themselves) may be candidates in one frame.
+    /// units (and units with themselves) may be candidates in one frame. 65,533 at most where pointers have 32
+    /// bits.
     pub interactions: &'m mut [InteractionSlot<E::Interaction>],
     /// Twice as many as one frame's interactions may push records.
     pub contacts: &'m mut [ContactSlot<E::Contact>],

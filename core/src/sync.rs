@@ -168,7 +168,9 @@ sites! {
     /// Relaxed: exclusive to the updater.
     CANDIDATE_HEAD = Relaxed;
     /// Relaxed: what an interaction slot says of its pair is published by the queue or the gate, what a
-    /// letter says by its push; what a latest-value cell notes of a slot is its writer's own.
+    /// letter says by its push. What a latest-value cell notes of a retired slot is its writer's own; that nobody
+    /// has left a slot is noted when all who had entered it have (`LATEST_REUSE`), and before others can
+    /// (`LATEST_PUBLISH`).
     SLOT_FIELD = Relaxed;
     /// Relaxed: a unit's frame tag changes only in its update and travels with the unit.
     FRAME_TAG = Relaxed;

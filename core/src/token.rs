@@ -5,9 +5,9 @@ use crate::sync::{Atomic, CachePadded, Cell, const_fn, seeded, site};
 
 /// The right to render, and the host's graphics context with it.
 ///
-/// A token is issued by [`crate::pipeline::Pipeline::token`], a limited number of times; it can
+/// A token is issued by [`crate::pipeline::Pipeline::token`], and there is a limited number at once; it can
 /// be neither cloned nor built elsewhere, so it cannot be forged or doubled. It may move from
-/// worker to worker, and the renderer moves along.
+/// worker to worker, and the renderer moves along. One that is forgotten (`mem::forget`) is never given back.
 #[derive(Debug)]
 pub struct Token<'p, R> {
     renderer: R,

@@ -18,6 +18,9 @@ pub enum Step {
     /// One work unit of this stage.
     Worked(Stage),
     /// Nothing: no work was visible. A hint, and may be stale.
+    ///
+    /// For a worker that has found nothing, others queue what they would else carry on. One that will not step again
+    /// for long, as in a task that runs once a period, had better be dropped.
     Idle,
 }
 
@@ -105,6 +108,7 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
             (Work::Render(unit), None) if self.carry.renders_shared => {
                 self.render_shared(env, unit)
             }
+            // A rendering comes to holders only.
             (Work::Render(_), None) => {
                 self.carry.queue(work);
                 Ok(())

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering::SeqCst};
 
 use dualframe_core::contacts::{ContactSlot, Contacts, SegmentSlot};
 use dualframe_core::environment::{Environment, Pair};
-use dualframe_core::error::{SetupError, StillRunning, Table, TableFull};
+use dualframe_core::error::{NotShared, SetupError, StillRunning, Table, TableFull};
 use dualframe_core::frame::Frame;
 use dualframe_core::inbox::{From as Sender, LetterSlot};
 use dualframe_core::inputs::Inputs;
@@ -360,18 +360,19 @@ fn all_tokens_or_a_shared_renderer() {
             let mut pipeline = pipeline.expect("tables that fit");
             let capacity = tokens as usize;
             let none_left = Err(((), full(Table::Tokens, capacity, capacity + 1)));
+            let not_shared = Err(((), NotShared { tokens }));
             assert_eq!(pipeline.take_back(), None);
             if tokens == 0 {
-                assert_eq!(pipeline.share(()), none_left);
+                assert_eq!(pipeline.share(()), not_shared);
                 return;
             }
             assert_eq!(pipeline.share(()), Ok(()));
             assert_eq!(pipeline.token(()).map(drop), none_left);
-            assert_eq!(pipeline.share(()), none_left, "there is one");
+            assert_eq!(pipeline.share(()), not_shared, "there is one");
             assert_eq!(pipeline.take_back(), Some(()));
             assert_eq!(pipeline.take_back(), None);
             std::mem::forget(pipeline.token(()));
-            assert_eq!(pipeline.share(()), none_left, "one is out");
+            assert_eq!(pipeline.share(()), not_shared, "one is out");
         });
     }
 }
