@@ -84,7 +84,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn token_time(gpu: Gpu, objects: usize) -> Result<(), Box<dyn Error>> {
     let frames = 40;
     let scene = ParticleScene::new(objects);
-    let look = Look::room(scene.room(), Quality::Fast);
+    let look = Look::room(scene.room());
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: None,
         size: wgpu::Extent3d { width: SIZE.0, height: SIZE.1, depth_or_array_layers: 1 },
@@ -96,7 +96,7 @@ fn token_time(gpu: Gpu, objects: usize) -> Result<(), Box<dyn Error>> {
         view_formats: &[],
     });
     let picture = texture.create_view(&Default::default());
-    let mut painter = Painter::new(gpu, look, OFFSCREEN_FORMAT, SIZE)?;
+    let mut painter = Painter::new(gpu, look, Quality::Fast, OFFSCREEN_FORMAT, SIZE)?;
     let settings = Settings { executor: ExecutorKind::Serial, threads: 1, ..Settings::default() };
     let mut manager = VeManager::new(scene.build()?, settings)?;
     let (mut adding, mut painting, mut working) = (Vec::new(), Vec::new(), Vec::new());
@@ -183,8 +183,8 @@ fn drawn(
     let Runner { executor, threads } = runner;
     let settings = Settings { executor, threads, ..Settings::default() };
     let mut manager = VeManager::new(scene.build()?, settings)?;
-    let look = Look::room(scene.room(), Quality::Fast);
-    let mut offscreen = Offscreen::new(Gpu::new(None)?, look, SIZE)?;
+    let look = Look::room(scene.room());
+    let mut offscreen = Offscreen::new(Gpu::new(None)?, look, Quality::Fast, SIZE)?;
     manager.run(WARM_UP, &mut offscreen, &mut |_| ())?;
     let began = Instant::now();
     manager.run(frames, &mut offscreen, &mut |_| ())?;

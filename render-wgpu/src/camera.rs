@@ -7,7 +7,7 @@ use glam::camera::rh::proj::directx::perspective_infinite_reverse;
 use glam::camera::rh::view::look_at_mat4;
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
-/// The vertical angle of view, in radians; usually 0.7 (40°).
+/// The angle of view over the picture's shorter side, in radians; usually 0.7 (40°).
 const FIELD_OF_VIEW: f32 = 0.7;
 /// The least distance of what is drawn, as a part of the distance to the target; usually 0.01.
 const NEAR: f32 = 0.01;
@@ -30,13 +30,14 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A camera that sees all of `bounds` from the front and a little above.
+    /// A camera that sees all of `bounds` from the front and a little above, whatever the picture's shape.
     #[must_use]
     pub fn around(bounds: &Bounds) -> Self {
         let radius = 0.5 * (bounds.max - bounds.min).length().max(1e-3);
         Self {
             target: bounds.center(),
-            distance: 1.05 * radius / (0.5 * FIELD_OF_VIEW).tan(),
+            // The ball around them touches what is seen at its sides, not at its middle.
+            distance: radius / (0.5 * FIELD_OF_VIEW).sin(),
             yaw: 0.5,
             pitch: 0.3,
         }
@@ -69,7 +70,8 @@ impl Camera {
     pub fn view_projection(&self, aspect: f32) -> Mat4 {
         let view = look_at_mat4(self.eye(), self.target, Vec3::Y);
         let near = NEAR * self.distance;
-        perspective_infinite_reverse(FIELD_OF_VIEW, aspect, near) * view
+        let angle = 2.0 * slopes(aspect).y.atan();
+        perspective_infinite_reverse(angle, aspect, near) * view
     }
 
     /// Goes round the target by angles in radians.
@@ -78,11 +80,11 @@ impl Camera {
         self.pitch = (self.pitch + pitch).clamp(-STEEPEST, STEEPEST);
     }
 
-    /// Moves sideways, so that what is at the target's distance moves by so much of the picture's
-    /// height.
-    pub fn pan(&mut self, by: Vec2) {
+    /// Moves sideways, so that what is at the target's distance moves by so much of the height of a picture
+    /// so many times as wide as high.
+    pub fn pan(&mut self, by: Vec2, aspect: f32) {
         let (right, up) = self.axes();
-        let height = 2.0 * self.distance * (0.5 * FIELD_OF_VIEW).tan();
+        let height = 2.0 * self.distance * slopes(aspect).y;
         self.target -= (right * by.x + up * by.y) * height;
     }
 
@@ -109,9 +111,15 @@ impl Camera {
     /// From the eye to what is seen at a point, a metre deep.
     fn ray(&self, point: Vec2, aspect: f32) -> Vec3 {
         let (right, up) = self.axes();
-        let slope = (0.5 * FIELD_OF_VIEW).tan();
-        right * (point.x * slope * aspect) + up * (point.y * slope) - self.outward()
+        let slopes = slopes(aspect);
+        right * (point.x * slopes.x) + up * (point.y * slopes.y) - self.outward()
     }
+}
+
+/// How far to the right and up one sees, at the picture's sides and a metre deep, in metres.
+fn slopes(aspect: f32) -> Vec2 {
+    let shorter = (0.5 * FIELD_OF_VIEW).tan();
+    Vec2::new(aspect.max(1.0), aspect.recip().max(1.0)) * shorter
 }
 
 /// What a camera can see, for culling by boxes (§5.6).
@@ -162,6 +170,24 @@ mod tests {
     }
 
     #[test]
+    fn all_that_it_is_around_is_seen() {
+        let boxes = [Vec3::ONE, Vec3::new(0.05, 2.0, 0.05), Vec3::new(2.0, 0.05, 0.3)];
+        for (half, aspect) in
+            boxes.into_iter().flat_map(|half| [0.4, 1.0, 2.5].map(|by| (half, by)))
+        {
+            let camera = Camera::around(&Bounds { min: -half, max: half });
+            let mut widest = 0.0_f32;
+            for corner in 0..8 {
+                let sign = |axis: u32| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
+                let corner = half * Vec3::new(sign(0), sign(1), sign(2));
+                let seen = camera.view_projection(aspect).project_point3(corner).truncate().abs();
+                widest = widest.max(seen.max_element());
+            }
+            assert!(widest <= 1.0 && widest > 0.35, "{half}, {aspect}: {widest}");
+        }
+    }
+
+    #[test]
     fn unprojects_what_it_projects() {
         let camera = camera();
         let place = Vec3::new(0.3, -0.2, 0.4);
@@ -177,7 +203,7 @@ mod tests {
     fn panning_moves_the_picture_with_the_hand() {
         let mut camera = camera();
         let target = camera.target;
-        camera.pan(Vec2::new(0.25, 0.0));
+        camera.pan(Vec2::new(0.25, 0.0), 1.0);
         // A quarter of the height to the right is half a unit of clip space at an aspect of 1.
         let moved = camera.view_projection(1.0).project_point3(target);
         assert!((moved.x - 0.5).abs() < 1e-4 && moved.y.abs() < 1e-4, "{moved}");

@@ -23,7 +23,6 @@ use crate::target::texture;
 #[repr(C)]
 pub(crate) struct Numbers {
     view_projection: [f32; 16],
-    inverse_view_projection: [f32; 16],
     light_projection: [f32; 16],
     eye: [f32; 3],
     coloring: u32,
@@ -40,6 +39,7 @@ pub(crate) struct Numbers {
 pub(crate) struct View {
     pub(crate) camera: Camera,
     pub(crate) look: Look,
+    quality: Quality,
     pub(crate) view_projection: Mat4,
     light_projection: Mat4,
     shadow_width: f32,
@@ -57,13 +57,14 @@ impl Numbers {
 const _: () = assert!(size_of::<Numbers>() <= GLOBALS * size_of::<f32>());
 
 impl View {
-    pub(crate) fn new(camera: Camera, look: Look, aspect: f32) -> Self {
+    pub(crate) fn new(camera: Camera, look: Look, quality: Quality, aspect: f32) -> Self {
         let view_projection = camera.view_projection(aspect);
         let (light_projection, shadow_width) = light_projection(&look);
         let size = (look.focus.max - look.focus.min).length();
         Self {
             camera,
             look,
+            quality,
             view_projection,
             light_projection,
             shadow_width,
@@ -85,10 +86,9 @@ impl View {
 
     /// What shaders read.
     pub(crate) fn numbers(&self) -> Numbers {
-        let Look { focus, room, coloring, quality, .. } = self.look;
+        let Look { focus, room, coloring, .. } = self.look;
         Numbers {
             view_projection: self.view_projection.to_cols_array(),
-            inverse_view_projection: self.view_projection.inverse().to_cols_array(),
             light_projection: self.light_projection.to_cols_array(),
             eye: self.camera.eye().to_array(),
             coloring: match coloring {
@@ -97,14 +97,14 @@ impl View {
                 Coloring::Speed => 2,
             },
             light: toward_light(&self.look).to_array(),
-            quality: match quality {
+            quality: match self.quality {
                 Quality::Fast => 0,
                 Quality::Fine => 1,
             },
             room_min: focus.min.to_array(),
             has_room: u32::from(room),
             room_max: focus.max.to_array(),
-            shadow_texel: self.shadow_width / quality.shadow_size() as f32,
+            shadow_texel: self.shadow_width / self.quality.shadow_size() as f32,
         }
     }
 }

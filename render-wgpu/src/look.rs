@@ -9,9 +9,11 @@ pub enum Coloring {
     /// The object's own colour.
     #[default]
     Object,
-    /// How far each node's springs are stretched (red) or pressed (blue), from their length at rest.
+    /// How far each node's springs are stretched (red at 20 %) or pressed (blue at −20 %), from their length at
+    /// rest (grey). Bodies without springs keep their own colour.
     Strain,
-    /// How fast each node is, from dark over red to white.
+    /// How fast each node is, or a rigid shape as a whole: from nearly black at rest over red and yellow to white at
+    /// 3 m/s.
     Speed,
 }
 
@@ -68,15 +70,13 @@ pub struct Look {
     pub light: Vec3,
     /// What the colour of surfaces says.
     pub coloring: Coloring,
-    /// How much work is spent on it. It does not change once the renderer is there.
-    pub quality: Quality,
 }
 
 impl Look {
     /// A room, lit from above and behind the viewer's left shoulder.
     #[must_use]
-    pub fn room(focus: Bounds, quality: Quality) -> Self {
+    pub fn room(focus: Bounds) -> Self {
         let light = Vec3::new(-0.35, 1.0, 0.6);
-        Self { focus, room: true, light, coloring: Coloring::default(), quality }
+        Self { focus, room: true, light, coloring: Coloring::default() }
     }
 }

@@ -13,7 +13,7 @@ use crate::camera::Camera;
 use crate::error::GraphicsError;
 use crate::globals::{Globals, View};
 use crate::gpu::Gpu;
-use crate::look::Look;
+use crate::look::{Look, Quality};
 use crate::pick::Picker;
 use crate::picture::{Picture, read_texture};
 use crate::room::Room;
@@ -33,8 +33,9 @@ pub struct Painter {
     gpu: Gpu,
     /// From where the next frame is seen.
     pub camera: Camera,
-    /// What the next frame looks like; its quality stays that of the beginning.
+    /// What the next frame looks like.
     pub look: Look,
+    quality: Quality,
     layouts: Layouts,
     globals: Globals,
     surfaces: Surfaces,
@@ -58,18 +59,19 @@ impl Painter {
     pub fn new(
         gpu: Gpu,
         look: Look,
+        quality: Quality,
         color: TextureFormat,
         size: (u32, u32),
     ) -> Result<Self, GraphicsError> {
         check_size(&gpu, size)?;
         let device = &gpu.device;
-        let format = Format { color, samples: look.quality.samples() };
+        let format = Format { color, samples: quality.samples() };
         let layouts = Layouts::new(device);
         let surfaces = Surfaces::new(device, &layouts, format);
         Ok(Self {
-            globals: Globals::new(device, &layouts, look.quality, surfaces.buffer()),
+            globals: Globals::new(device, &layouts, quality, surfaces.buffer()),
             surfaces,
-            volumes: Volumes::new(device, &layouts, format, look.quality),
+            volumes: Volumes::new(device, &layouts, format, quality),
             room: Room::new(device, &layouts, format),
             picker: Picker::new(device, &layouts),
             integrator: Integrator::default(),
@@ -79,6 +81,7 @@ impl Painter {
             layouts,
             format,
             look,
+            quality,
             gpu,
             view: None,
             failure: None,
@@ -136,7 +139,7 @@ impl Painter {
         let view = self.view.get_or_insert_with(|| {
             surfaces.clear(&gpu.queue);
             volumes.clear();
-            View::new(self.camera, self.look, self.target.aspect())
+            View::new(self.camera, self.look, self.quality, self.target.aspect())
         });
         if let Some(springs) = GpuMassSpring::of(object)
             && gpu.failure().is_none()
@@ -175,7 +178,7 @@ impl Painter {
         let view = self.view.take().unwrap_or_else(|| {
             self.surfaces.clear(&self.gpu.queue);
             self.volumes.clear();
-            View::new(self.camera, self.look, self.target.aspect())
+            View::new(self.camera, self.look, self.quality, self.target.aspect())
         });
         let Gpu { device, queue, .. } = &self.gpu;
         let numbers = view.numbers();
@@ -216,7 +219,9 @@ impl Painter {
     /// Nothing is drawn from now on: whoever waits for a unit of GPU work is told.
     fn fail(&mut self, failure: GraphicsError) {
         let view = self.view.take();
-        let view = view.unwrap_or_else(|| View::new(self.camera, self.look, self.target.aspect()));
+        let view = view.unwrap_or_else(|| {
+            View::new(self.camera, self.look, self.quality, self.target.aspect())
+        });
         let size = self.size();
         let Self { gpu, surfaces, picker, integrator, units, .. } = self;
         units.refuse(&Context { gpu, view: &view, size, surfaces, picker, integrator }, &failure);
@@ -234,6 +239,12 @@ fn check_size(gpu: &Gpu, (width, height): (u32, u32)) -> Result<(), GraphicsErro
     }
 }
 
+/// What a painter's pictures are drawn to without a window.
+fn picture_for(painter: &Painter) -> Texture {
+    let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC;
+    texture(&painter.gpu.device, "picture", OFFSCREEN_FORMAT, painter.size(), 1, usage)
+}
+
 /// Draws every frame without a window. The last frame's picture can be read.
 pub struct Offscreen {
     /// What draws.
@@ -249,11 +260,14 @@ impl Offscreen {
     ///
     /// # Errors
     /// No pixels, or more than the adapter allows.
-    pub fn new(gpu: Gpu, look: Look, (width, height): (u32, u32)) -> Result<Self, GraphicsError> {
-        let painter = Painter::new(gpu, look, OFFSCREEN_FORMAT, (width, height))?;
-        let device = &painter.gpu().device;
-        let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC;
-        let texture = texture(device, "picture", OFFSCREEN_FORMAT, (width, height), 1, usage);
+    pub fn new(
+        gpu: Gpu,
+        look: Look,
+        quality: Quality,
+        size: (u32, u32),
+    ) -> Result<Self, GraphicsError> {
+        let painter = Painter::new(gpu, look, quality, OFFSCREEN_FORMAT, size)?;
+        let texture = picture_for(&painter);
         let view = texture.create_view(&Default::default());
         Ok(Self { painter, texture, view, submitted: None })
     }
@@ -276,6 +290,10 @@ impl Renderer for Offscreen {
     }
 
     fn swap(&mut self, _frame: u64) {
+        if (self.texture.width(), self.texture.height()) != self.painter.size() {
+            self.texture = picture_for(&self.painter);
+            self.view = self.texture.create_view(&Default::default());
+        }
         let mut encoder = self.painter.gpu().device.create_command_encoder(&Default::default());
         self.painter.paint(&mut encoder, &self.view);
         if self.painter.failure().is_some() {

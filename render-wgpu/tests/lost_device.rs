@@ -37,8 +37,9 @@ fn the_run_goes_on() {
         undrawn.run(FRAMES, drawing_nothing, &mut |_| {}).expect("it runs");
 
         let gpu = Gpu::new(None).expect("an adapter");
-        let look = Look::room(particles().room(), Quality::Fast);
-        let mut offscreen = Offscreen::new(gpu, look, (320, 200)).expect("the size is allowed");
+        let look = Look::room(particles().room());
+        let mut offscreen =
+            Offscreen::new(gpu, look, Quality::Fast, (320, 200)).expect("the size is allowed");
         let device = offscreen.painter.gpu().device.clone();
         let (auxiliary, mut answers) = (offscreen.painter.auxiliary(), Vec::new());
         let mut drawn = manager(executor);

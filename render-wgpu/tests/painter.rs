@@ -4,8 +4,9 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
 use dualframe_render_wgpu::gpu::Gpu;
-use dualframe_render_wgpu::look::{Look, Quality};
+use dualframe_render_wgpu::look::{Coloring, Look, Quality};
 use dualframe_render_wgpu::pick::{Pick, Picked};
+use dualframe_render_wgpu::picture::Picture;
 use dualframe_render_wgpu::renderer::Offscreen;
 use dualframe_sim::behavior::Fixed;
 use dualframe_sim::geometry::{Bounds, Geometry, Mesh, Rigid, Topology};
@@ -24,7 +25,7 @@ const RADIUS: f32 = 0.1;
 fn offscreen() -> Offscreen {
     let focus = Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
     let gpu = Gpu::new(None).expect("these tests need a graphics adapter; one in software will do");
-    Offscreen::new(gpu, Look::room(focus, Quality::Fast), SIZE).expect("a small picture")
+    Offscreen::new(gpu, Look::room(focus), Quality::Fast, SIZE).expect("a small picture")
 }
 
 fn ball(id: u32, place: Vec3) -> Object {
@@ -57,6 +58,65 @@ fn frames_that_are_not_drawn_leave_nothing() {
     };
     let (few, many) = (after(10), after(100));
     assert!(many <= few, "{few} bytes, then {many}");
+}
+
+#[test]
+#[ignore = "needs a graphics adapter; .ci/run has one"]
+fn pictures_follow_the_size() {
+    let mut offscreen = offscreen();
+    for (width, height) in [SIZE, (100, 70), (400, 300)] {
+        offscreen.painter.resize(width, height).expect("a small picture");
+        offscreen.draw(&ball(0, Vec3::ZERO));
+        offscreen.swap(0);
+        let picture = offscreen.picture().expect("the device works");
+        assert_eq!((picture.width, picture.height), (width, height));
+    }
+}
+
+/// The colour of the middle of a picture.
+fn middle(picture: &Picture) -> [u8; 3] {
+    let (pixels, _) = picture.pixels.as_chunks::<4>();
+    let [r, g, b, _] = pixels[(picture.height / 2 * picture.width + picture.width / 2) as usize];
+    [r, g, b]
+}
+
+#[test]
+#[ignore = "needs a graphics adapter; .ci/run has one"]
+fn a_rigid_shape_has_a_speed() {
+    let mut offscreen = offscreen();
+    offscreen.painter.look.coloring = Coloring::Speed;
+    let mut at = |speed: f32| {
+        let mut object = ball(0, Vec3::ZERO);
+        object.geometry.as_rigid_mut().expect("a ball").velocity = Vec3::X * speed;
+        offscreen.draw(&object);
+        offscreen.swap(0);
+        middle(&offscreen.picture().expect("the device works"))
+    };
+    let (rest, slow, fast) = (at(0.0), at(1.0), at(3.0));
+    assert!(rest.into_iter().all(|channel| channel < 80), "{rest:?}");
+    assert!(slow[0] > 120 && slow[2] < 80, "not red: {slow:?}");
+    assert!(fast.into_iter().all(|channel| channel > 120), "not white: {fast:?}");
+}
+
+/// A flat box seen from above, so far below what light and shadow are fitted to.
+#[test]
+#[ignore = "needs a graphics adapter; .ci/run has one"]
+fn what_the_light_does_not_reach_is_not_in_shadow() {
+    let mut offscreen = offscreen();
+    offscreen.painter.look.room = false;
+    offscreen.painter.look.light = Vec3::Y;
+    offscreen.painter.camera.pitch = 1.4;
+    let mut below = |depth: f32| {
+        let shape = SharedShape::cuboid(0.8, 0.01, 0.8);
+        let pose = Pose::from_translation(Vec3::NEG_Y * depth);
+        let geometry = Geometry::Rigid(Rigid::new(shape, pose));
+        offscreen.draw(&Object::new(ObjectId(0), Group(0), geometry, Fixed));
+        offscreen.swap(0);
+        middle(&offscreen.picture().expect("the device works"))
+    };
+    let (inside, outside) = (below(0.9), below(1.5));
+    let differ = inside.iter().zip(outside).any(|(a, b)| a.abs_diff(b) > 20);
+    assert!(!differ, "{inside:?} within, {outside:?} below");
 }
 
 #[test]

@@ -28,8 +28,8 @@ const TOLERANCE: f32 = 1e-5;
 
 fn offscreen(scene: &ParticleScene) -> Offscreen {
     let gpu = Gpu::new(None).expect("a graphics adapter");
-    let look = Look::room(scene.room(), Quality::Fast);
-    Offscreen::new(gpu, look, (64, 48)).expect("64 by 48 pixels")
+    let look = Look::room(scene.room());
+    Offscreen::new(gpu, look, Quality::Fast, (64, 48)).expect("64 by 48 pixels")
 }
 
 /// The scene, with the springs of those objects that are chosen on the device.

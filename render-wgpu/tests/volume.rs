@@ -35,8 +35,8 @@ fn ball(id: u32, place: Vec3, radius: f32) -> Object {
 fn offscreen() -> Offscreen {
     let focus = Bounds { min: Vec3::splat(-0.03), max: Vec3::splat(0.03) };
     let gpu = Gpu::new(None).expect("these tests need a graphics adapter; one in software will do");
-    let look = Look { room: false, ..Look::room(focus, Quality::Fast) };
-    let mut offscreen = Offscreen::new(gpu, look, SIZE).expect("a small picture");
+    let look = Look { room: false, ..Look::room(focus) };
+    let mut offscreen = Offscreen::new(gpu, look, Quality::Fast, SIZE).expect("a small picture");
     offscreen.painter.camera.pitch = 0.9;
     offscreen
 }
@@ -181,4 +181,24 @@ fn sending_what_changed_is_enough() {
     object.geometry = Geometry::Volume(bone_piece(64, pose).expect("64 voxels"));
     let replaced = draw(&mut offscreen, std::slice::from_ref(&object));
     assert_eq!(differing(&replaced, &first, 0), 0);
+}
+
+#[test]
+#[ignore = "needs a graphics adapter; .ci/run has one"]
+fn a_copy_that_went_another_way_is_drawn_whole() {
+    let pose =
+        Pose::from_parts(Vec3::new(-0.032, -0.038, 0.032), Quat::from_rotation_x(-FRAC_PI_2));
+    let pristine = bone_piece(64, pose).expect("64 voxels");
+    let drilled = |x: f32| {
+        let mut bone = pristine.clone();
+        drill_burr_hole(&mut bone, Vec3::new(x, 0.02, 0.004), Vec3::NEG_Y, 0.004, 0.03);
+        [object(0, Geometry::Volume(bone), BONE)]
+    };
+    let (one, other) = (drilled(-0.012), drilled(0.012));
+    let mut offscreen = offscreen();
+    let before = draw(&mut offscreen, &one);
+    let picture = draw(&mut offscreen, &other);
+    assert!(differing(&picture, &before, 8) > 80, "the holes are not seen");
+    let anew = draw(&mut self::offscreen(), &other);
+    assert_eq!(differing(&picture, &anew, 0), 0);
 }

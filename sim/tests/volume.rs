@@ -34,10 +34,10 @@ fn two_pieces() -> Scene {
     Scene::new(vec![drilled(0, 44.0), drilled(1, 40.0)], no_rules())
 }
 
-/// What a graphics device would hold of each volume, and the revision it is of.
+/// What a graphics device would hold of each volume, each brick with its revision.
 #[derive(Default)]
 struct Mirror {
-    held: HashMap<ObjectId, (u64, Vec<[u8; BRICK_VOXELS]>)>,
+    held: HashMap<ObjectId, Vec<(u64, [u8; BRICK_VOXELS])>>,
     taken: usize,
     swaps: u64,
 }
@@ -45,18 +45,19 @@ struct Mirror {
 impl Mirror {
     fn take(&mut self, id: ObjectId, volume: &Volume) {
         let counts = volume.brick_counts().map(|count| count as usize);
-        let empty = || (0, vec![[0; BRICK_VOXELS]; counts.iter().product()]);
-        let (revision, bricks) = self.held.entry(id).or_insert_with(empty);
+        let empty = || vec![(0, [0; BRICK_VOXELS]); counts.iter().product()];
+        let bricks = self.held.entry(id).or_insert_with(empty);
         let number =
             |[x, y, z]: [u32; 3]| (z as usize * counts[1] + y as usize) * counts[0] + x as usize;
-        for brick in volume.changed_since(*revision) {
-            bricks[number(brick.place)] = *brick.densities;
-            self.taken += 1;
+        for (brick, held) in volume.bricks().zip(bricks.iter_mut()) {
+            if held.0 != brick.revision {
+                *held = (brick.revision, *brick.densities);
+                self.taken += 1;
+            }
         }
-        *revision = volume.revision();
         let held = |voxel: [u32; 3]| {
             let slot = voxel.map(|index| (index % BRICK_SIDE) as usize);
-            bricks[number(voxel.map(|index| index / BRICK_SIDE))]
+            bricks[number(voxel.map(|index| index / BRICK_SIDE))].1
                 [(slot[2] * 16 + slot[1]) * 16 + slot[0]]
         };
         let whole = Volume::from_fn(volume.dims(), volume.spacing(), volume.pose, held);

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::thread;
 
 use dualframe_render_wgpu::camera::Camera;
-use dualframe_render_wgpu::look::{Look, Quality};
+use dualframe_render_wgpu::look::Look;
 use dualframe_sim::behavior::Bone;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::device::link::{HapticLink, SimulationEnd, ToolState};
@@ -132,8 +132,7 @@ fn run_unwatched<'a, 'c, 'h>(
         surgery.operator = Some(Operator::new(links, &mut surgery, args.haptic_rate)?);
     }
     let frames = args.frames.unwrap_or_else(|| surgery.frames());
-    let look = |quality| look(surgery.region(), quality);
-    let mut pictures = Pictures::new(&args.products, frames, look, told)?;
+    let mut pictures = Pictures::new(&args.products, frames, look(surgery.region()), told)?;
     let mut recording = begin(&manager)?;
     let mut measure = Measure::new(Some(frames), count);
     let bar = progress::of_frames(frames);
@@ -258,13 +257,13 @@ impl<'c> Surgery<'c> {
 
 /// What the place of the operation looks like: from above and from the side of the surgeon, who stands at
 /// the patient's head.
-pub(super) fn look(region: Bounds, quality: Quality) -> (Look, Camera) {
+pub(super) fn look(region: Bounds) -> (Look, Camera) {
     let around = Camera::around(&region);
     let camera = Camera { pitch: 0.75, yaw: 0.15, distance: DISTANCE * around.distance, ..around };
     let light = Vec3::new(-0.35, 1.0, 0.6);
     // The whole head, for its shadows.
     let focus = Bounds { min: Vec3::splat(-0.11), max: Vec3::splat(0.11) };
-    (Look { light, room: false, ..Look::room(focus, quality) }, camera)
+    (Look { light, room: false, ..Look::room(focus) }, camera)
 }
 
 /// The bone that was drilled away, in cubic metres of full bone.

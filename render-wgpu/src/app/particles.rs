@@ -8,6 +8,7 @@ use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::look::Look;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::{ExecutorKind, FrameRecord};
+use dualframe_sim::geometry::Bounds;
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::record::RecordError;
 use dualframe_sim::render::{NullRenderer, Renderer};
@@ -95,6 +96,11 @@ fn begin_recording<'a>(
     Recording::begin(outputs.record.as_deref(), &spec, manager, told)
 }
 
+/// What a room of particles looks like.
+pub(super) fn look(room: Bounds) -> (Look, Camera) {
+    (Look::room(room), Camera::around(&room))
+}
+
 /// Runs without a window.
 fn run_unwatched(
     args: &Particles,
@@ -104,8 +110,7 @@ fn run_unwatched(
     told: &Told,
 ) -> Result<Report, RunError> {
     let frames = args.frames();
-    let room = scene_of(args, args.objects).room();
-    let look = |quality| (Look::room(room, quality), Camera::around(&room));
+    let look = look(scene_of(args, args.objects).room());
     let mut pictures = Pictures::new(&args.products, frames, look, told)?;
     let mut recording = begin_recording(args, outputs, &manager, told)?;
     let mut measure = Measure::new(Some(frames), count);

@@ -38,12 +38,11 @@ pub(super) struct Pictures<'a> {
 }
 
 impl<'a> Pictures<'a> {
-    /// `None` if no pictures are wanted. `look` says what a picture of this quality looks like, and from
-    /// where it is taken.
+    /// `None` if no pictures are wanted.
     pub(super) fn new(
         args: &Products,
         frames: u64,
-        look: impl FnOnce(Quality) -> (Look, Camera),
+        (look, camera): (Look, Camera),
         told: &'a Told,
     ) -> Result<Option<Self>, RunError> {
         if !args.offscreen && args.frames_out.is_none() && args.picture.is_none() {
@@ -53,8 +52,7 @@ impl<'a> Pictures<'a> {
         // What is drawn for its speed is drawn as a window would; a picture is to be looked at.
         let is_for_speed = args.offscreen && args.picture.is_none() && args.frames_out.is_none();
         let quality = if is_for_speed && gpu.is_software() { Quality::Fast } else { Quality::Fine };
-        let (look, camera) = look(quality);
-        let mut offscreen = Offscreen::new(gpu, look, args.size)?;
+        let mut offscreen = Offscreen::new(gpu, look, quality, args.size)?;
         offscreen.painter.camera = camera;
         let sequence = args.frames_out.as_deref().map(Sequence::new).transpose();
         Ok(Some(Self {

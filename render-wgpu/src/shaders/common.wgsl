@@ -2,7 +2,6 @@
 
 struct Globals {
     view_projection: mat4x4f,
-    inverse_view_projection: mat4x4f,
     light_projection: mat4x4f,
     eye: vec3f,
     // 0: object, 1: strain, 2: speed.
@@ -36,7 +35,8 @@ fn shadow(position: vec3f, normal: vec3f) -> vec2f {
     let off = position + normal * (1.5 * globals.shadow_texel);
     let clip = globals.light_projection * vec4f(off, 1.0);
     let uv = clip.xy * vec2f(0.5, -0.5) + 0.5;
-    if any(uv < vec2f(0.0)) || any(uv > vec2f(1.0)) {
+    // What lies beside the map, or farther from the light than it reaches, is in nobody's shadow.
+    if any(uv < vec2f(0.0)) || any(uv > vec2f(1.0)) || clip.z > 1.0 {
         return vec2f(1.0);
     }
     if globals.quality == 0u {

@@ -10,9 +10,12 @@ struct Instance {
     // Its number of nodes.
     @location(4) nodes: u32,
     @location(5) object: u32,
+    // Of the body as a whole, in m/s; nodes may have more of their own.
+    @location(6) velocity: vec3f,
 }
 
-// For each body the nodes' x, then y, then z; if colours say the speed, velocities likewise.
+// For each body the nodes' x, then y, then z; if colours say the speed, their own velocities likewise, as far as
+// they have any.
 @group(1) @binding(0) var<storage, read> numbers: array<f32>;
 // For each node where its ring begins; a ring has for each triangle at the node the two other nodes,
 // and the distance to the first of them at rest, or 0 if no spring leads there.
@@ -68,7 +71,7 @@ fn vertex(body: Instance, @builtin(vertex_index) node: u32) -> Vertex {
     if globals.coloring == 1u && springs > 0.0 {
         color = strain_color(strain / springs);
     } else if globals.coloring == 2u {
-        color = speed_color(length(vector(body, 1u, node)));
+        color = speed_color(length(body.velocity + vector(body, 1u, node)));
     }
     let position = turned(body.rotation, own) + body.place;
     let clip = globals.view_projection * vec4f(position, 1.0);

@@ -25,6 +25,7 @@ pub(crate) struct Instance {
     pub(crate) color: [f32; 4],
     pub(crate) nodes: u32,
     pub(crate) object: u32,
+    pub(crate) velocity: [f32; 3],
 }
 
 /// What makes the bodies of a make alike. It is kept, so that its address stays its own.
@@ -56,7 +57,8 @@ pub(super) struct Make {
     pub(super) rings: BindGroup,
     /// The nodes of a rigid shape, which never change.
     pub(super) own_numbers: Option<BindGroup>,
-    /// Whether the surface has a border, so that its inside may be seen.
+    /// Whether some side belongs to one triangle alone: at a border, where the inside may be seen, or at sharp
+    /// edges, where triangles have nodes of their own.
     pub(super) is_open: bool,
     pub(super) nodes: u32,
     /// This frame's bodies that are drawn as surfaces.
@@ -93,7 +95,9 @@ impl Make {
         let surface = Surface::new(nodes.len(), &triangles, |_| 0.0);
         let mut make = Self::new(device, layouts, Likeness::Rigid(shape.clone()), &surface);
         let components = (0..3).flat_map(|axis| nodes.iter().map(move |node| node[axis]));
-        let numbers: Vec<f32> = components.collect();
+        // Its nodes have no velocities of their own.
+        let at_rest = std::iter::repeat_n(0.0, 3 * nodes.len());
+        let numbers: Vec<f32> = components.chain(at_rest).collect();
         let buffer = device.create_buffer_init(&BufferInitDescriptor {
             label: Some("rigid shape"),
             contents: bytemuck::cast_slice(&numbers),

@@ -34,6 +34,13 @@ use crate::target::Format;
 /// every cut.
 pub(crate) const KEPT_FRAMES: u64 = 600;
 
+/// What a body does as a whole: how it is turned, where it is and how fast it goes.
+struct Motion {
+    turned: [f32; 4],
+    place: [f32; 3],
+    velocity: [f32; 3],
+}
+
 /// The surfaces of a frame.
 pub(crate) struct Surfaces {
     pipelines: Pipelines,
@@ -101,7 +108,8 @@ impl Surfaces {
         if coloring == Coloring::Speed {
             self.stage(&mesh.velocities);
         }
-        self.add(make, object, first, [0.0, 0.0, 0.0, 1.0], [0.0; 3]);
+        let of_body = Motion { turned: [0.0, 0.0, 0.0, 1.0], place: [0.0; 3], velocity: [0.0; 3] };
+        self.add(make, object, first, of_body);
     }
 
     /// Adds a rigid shape. One without bounds is not drawn.
@@ -121,8 +129,12 @@ impl Surfaces {
             }
             return;
         };
-        let (turned, place) = (rigid.pose.rotation.to_array(), rigid.pose.translation.to_array());
-        self.add(make, object, 0, turned, place);
+        let of_body = Motion {
+            turned: rigid.pose.rotation.to_array(),
+            place: rigid.pose.translation.to_array(),
+            velocity: rigid.velocity.to_array(),
+        };
+        self.add(make, object, 0, of_body);
     }
 
     fn make(&mut self, address: usize, new: impl FnOnce() -> Option<Make>) -> Option<usize> {
@@ -141,17 +153,17 @@ impl Surfaces {
         }
     }
 
-    fn add(
-        &mut self,
-        make: usize,
-        object: &Object,
-        first: u32,
-        rotation: [f32; 4],
-        place: [f32; 3],
-    ) {
+    fn add(&mut self, make: usize, object: &Object, first: u32, of_body: Motion) {
         let make = &mut self.makes[make];
-        let (color, nodes) = (object.visual.color, make.nodes);
-        let instance = Instance { rotation, place, first, color, nodes, object: object.id().0 };
+        let instance = Instance {
+            rotation: of_body.turned,
+            place: of_body.place,
+            first,
+            color: object.visual.color,
+            nodes: make.nodes,
+            object: object.id().0,
+            velocity: of_body.velocity,
+        };
         make.used = self.frame;
         match object.drawing {
             Drawing::Edges => make.wires.push(instance),

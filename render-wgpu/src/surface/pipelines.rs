@@ -15,8 +15,8 @@ use crate::target::{DEPTH, Format};
 /// The format of the shadow map.
 pub(crate) const SHADOW: TextureFormat = TextureFormat::Depth32Float;
 
-const ATTRIBUTES: [VertexAttribute; 6] = vertex_attr_array![
-    0 => Float32x4, 1 => Float32x3, 2 => Uint32, 3 => Float32x4, 4 => Uint32, 5 => Uint32
+const ATTRIBUTES: [VertexAttribute; 7] = vertex_attr_array![
+    0 => Float32x4, 1 => Float32x3, 2 => Uint32, 3 => Float32x4, 4 => Uint32, 5 => Uint32, 6 => Float32x3
 ];
 
 /// One list of bodies.
@@ -30,7 +30,7 @@ pub(crate) const INSTANCES: VertexBufferLayout<'static> = VertexBufferLayout {
 pub(super) struct Pipelines {
     /// Of closed surfaces, whose inside is never seen.
     pub(super) closed: RenderPipeline,
-    /// Of surfaces with a border.
+    /// Of surfaces whose inside may be seen.
     pub(super) open: RenderPipeline,
     pub(super) edges: RenderPipeline,
     pub(super) shadows: RenderPipeline,

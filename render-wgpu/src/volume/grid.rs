@@ -30,8 +30,10 @@ struct Numbers {
 /// What the device holds of a volume.
 pub(super) struct Grid {
     dims: [u32; 3],
-    /// The volume's revision that the device has; 0 for none.
+    /// The revision of the volume that the device has; 0 for none.
     revision: u64,
+    /// That of each of its bricks; 0 for none, which is empty.
+    bricks: Vec<u64>,
     densities: Texture,
     /// The greatest density in each cell.
     peaks: Texture,
@@ -77,17 +79,19 @@ impl Grid {
                 },
             ],
         });
-        let staged = vec![0; volume.brick_counts()[0] as usize * BRICK_VOXELS];
-        Ok(Self { dims, revision: 0, densities, peaks, cells, staged, numbers, bound, used: 0 })
+        let counts = volume.brick_counts().map(|count| count as usize);
+        let staged = vec![0; counts[0] * BRICK_VOXELS];
+        let bricks = vec![0; counts.iter().product()];
+        let (revision, used) = (0, 0);
+        Ok(Self { dims, revision, bricks, densities, peaks, cells, staged, numbers, bound, used })
     }
 
-    /// Whether it may hold an earlier state of a volume. The textures of one that it is not are new,
-    /// and so are empty.
+    /// Whether a volume is of its size.
     pub(super) fn fits(&self, volume: &Volume) -> bool {
-        self.dims == volume.dims() && self.revision <= volume.revision()
+        self.dims == volume.dims()
     }
 
-    /// Sends what changed of a volume that it fits.
+    /// Sends what differs of a volume that fits from what the device has.
     pub(super) fn upload(&mut self, queue: &Queue, volume: &Volume, color: [f32; 4], step: f32) {
         let numbers = Numbers {
             rotation: volume.pose.rotation.to_array(),
@@ -101,10 +105,14 @@ impl Grid {
         if self.revision == volume.revision() {
             return;
         }
-        // The textures of a new volume are empty already.
-        let is_new = self.revision == 0;
-        let news = volume.changed_since(self.revision);
-        let mut bricks = news.filter(|brick| !(is_new && brick.is_empty())).peekable();
+        let mut held = std::mem::take(&mut self.bricks);
+        let news = volume.bricks().zip(&mut held).filter_map(|(brick, held)| {
+            let before = std::mem::replace(held, brick.revision);
+            // What the device has of nothing is empty already.
+            let is_there = before == brick.revision || before == 0 && brick.is_empty();
+            (!is_there).then_some(brick)
+        });
+        let mut bricks = news.peekable();
         let mut begin = None;
         while let Some(brick) = bricks.next() {
             self.stage(&brick);
@@ -118,6 +126,7 @@ impl Grid {
             }
         }
         drop(bricks);
+        self.bricks = held;
         self.cells.refresh();
         self.send_peaks(queue);
         self.revision = volume.revision();

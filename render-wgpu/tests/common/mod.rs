@@ -39,8 +39,8 @@ pub(crate) fn room(objects: usize) -> Bounds {
 
 fn offscreen(focus: Bounds, coloring: Coloring) -> Offscreen {
     let gpu = Gpu::new(None).expect("there is a graphics adapter");
-    let look = Look { coloring, ..Look::room(focus, Quality::Fine) };
-    Offscreen::new(gpu, look, SIZE).expect("a small picture")
+    let look = Look { coloring, ..Look::room(focus) };
+    Offscreen::new(gpu, look, Quality::Fine, SIZE).expect("a small picture")
 }
 
 fn read(offscreen: &Offscreen) -> Picture {

@@ -39,7 +39,9 @@ pub(super) enum Gesture {
 
 /// The window and what has come from it.
 pub(super) struct Input {
-    size: (u32, u32),
+    /// The size wanted, then that of the window, in pixels. It is told, not asked for: a display may be slow to
+    /// answer.
+    pub(super) size: PhysicalSize<u32>,
     pub(super) window: Option<Arc<Window>>,
     pub(super) egui: Option<State>,
     /// Why there is no window.
@@ -53,9 +55,9 @@ pub(super) struct Input {
 }
 
 impl Input {
-    pub(super) fn new(size: (u32, u32)) -> Self {
+    pub(super) fn new((width, height): (u32, u32)) -> Self {
         Self {
-            size,
+            size: PhysicalSize::new(width, height),
             window: None,
             egui: None,
             failure: None,
@@ -100,12 +102,13 @@ impl ApplicationHandler for Input {
         if self.window.is_some() {
             return;
         }
-        let (width, height) = self.size;
-        let attributes = Window::default_attributes()
-            .with_title("dualframe")
-            .with_inner_size(PhysicalSize::new(width, height));
+        let attributes =
+            Window::default_attributes().with_title("dualframe").with_inner_size(self.size);
         match event_loop.create_window(attributes) {
-            Ok(window) => self.window = Some(Arc::new(window)),
+            Ok(window) => {
+                self.size = window.inner_size();
+                self.window = Some(Arc::new(window));
+            }
             Err(error) => self.failure = Some(error.to_string()),
         }
     }
@@ -118,6 +121,7 @@ impl ApplicationHandler for Input {
         });
         match event {
             WindowEvent::CloseRequested | WindowEvent::Destroyed => self.is_closing = true,
+            WindowEvent::Resized(size) => self.size = size,
             WindowEvent::CursorMoved { position, .. } => {
                 let cursor = Vec2::new(position.x as f32, position.y as f32);
                 let moved = cursor - std::mem::replace(&mut self.cursor, cursor);

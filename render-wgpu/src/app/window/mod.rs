@@ -23,7 +23,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use dualframe_render_wgpu::camera::Camera;
-use dualframe_render_wgpu::look::{Look, Quality};
+use dualframe_render_wgpu::look::Look;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::{ExecutorKind, FrameRecord, OnFrame};
 use dualframe_sim::manager::{Settings, VeManager};
@@ -61,7 +61,7 @@ pub(super) trait Scenario {
     const GRAIN: Grain;
 
     /// What it looks like, and from where it is seen at first.
-    fn look(&self, quality: Quality) -> (Look, Camera);
+    fn look(&self) -> (Look, Camera);
 
     /// The environment, to begin anew.
     fn build(&mut self, hand: &Self::Hand) -> Result<Scene, RunError>;
@@ -120,8 +120,7 @@ impl<'a, S: Scenario> Session<'a, S> {
             timeline: Arc::clone(timeline),
             hand,
         };
-        let look = |quality| scenario.look(quality);
-        match View::open(shown, look, products.adapter.as_deref(), controls) {
+        match View::open(shown, scenario.look(), products.adapter.as_deref(), controls) {
             Ok(view) => Ok(Some(Self { scenario, view, applied: controls, way, spent, told })),
             Err(error) if products.window => Err(error.into()),
             Err(error) => {
@@ -146,7 +145,7 @@ impl<'a, S: Scenario> Session<'a, S> {
         picture: Option<&File>,
         measure: &mut Measure<'_>,
     ) -> Result<(VeManager, S), RunError> {
-        self.view.turn_to(|_| None, manager.mailbox());
+        self.view.turn_to(self.scenario.look(), manager.mailbox());
         let mut left = frames.unwrap_or(u64::MAX);
         while left > 0 && !self.view.is_closing() {
             manager = self.apply(manager, &mut recording)?;
@@ -248,7 +247,7 @@ impl<'a, S: Scenario> Session<'a, S> {
     fn restart(&mut self) -> Result<VeManager, RunError> {
         let scene = self.scenario.build(&self.view.hand)?;
         let manager = self.manage(scene)?;
-        self.view.turn_to(|quality| Some(self.scenario.look(quality)), manager.mailbox());
+        self.view.turn_to(self.scenario.look(), manager.mailbox());
         Ok(manager)
     }
 

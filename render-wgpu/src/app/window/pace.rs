@@ -69,6 +69,13 @@ impl Pace {
         self.next_shown = (self.next_shown + self.between_shown).max(begun);
     }
 
+    /// There was no texture for a picture that was begun then: the next is asked for when another would be due,
+    /// and not before as long again as the answer took.
+    pub(super) fn missed(&mut self, begun: Instant) {
+        let now = Instant::now();
+        self.next_shown = now + (now - begun).max(self.between_shown);
+    }
+
     /// Waits until the next frame is due, if it is to be no faster than the real world.
     pub(super) fn keep(&mut self, is_real_time: bool) {
         let now = Instant::now();

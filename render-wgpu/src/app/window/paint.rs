@@ -1,7 +1,7 @@
 //! The overlay on the device.
 
 use dualframe_render_wgpu::gpu::Gpu;
-use egui::{Context, Ui, ViewportId};
+use egui::{Context, TextureId, Ui, ViewportId};
 use egui_wgpu::{Renderer, RendererOptions, ScreenDescriptor};
 use egui_winit::State;
 use wgpu::{
@@ -14,6 +14,8 @@ use winit::window::Window;
 pub(super) struct OverlayPainter {
     context: Context,
     renderer: Renderer,
+    /// Textures given up with the last output, whose commands were not submitted yet.
+    given_up: Vec<TextureId>,
 }
 
 impl OverlayPainter {
@@ -21,7 +23,7 @@ impl OverlayPainter {
         let renderer = Renderer::new(&gpu.device, format, RendererOptions::default());
         let context = Context::default();
         context.set_visuals(egui::Visuals::dark());
-        Self { context, renderer }
+        Self { context, renderer, given_up: Vec::new() }
     }
 
     /// What turns the window's events into egui's.
@@ -40,6 +42,7 @@ impl OverlayPainter {
         show: impl FnMut(&mut Ui),
     ) -> Vec<CommandBuffer> {
         let Gpu { device, queue, .. } = gpu;
+        self.given_up.drain(..).for_each(|id| self.renderer.free_texture(&id));
         let mut output = self.context.run_ui(input.take_egui_input(window), show);
         input.handle_platform_output(window, output.platform_output);
         for (id, deltas) in &output.textures_delta.set {
@@ -65,9 +68,7 @@ impl OverlayPainter {
             ..Default::default()
         });
         self.renderer.render(&mut pass.forget_lifetime(), &triangles, &screen);
-        for id in &output.textures_delta.free {
-            self.renderer.free_texture(id);
-        }
+        self.given_up.extend(&output.textures_delta.free);
         // What is left of it would be reported as forgotten.
         output.textures_delta.clear();
         before

@@ -8,6 +8,7 @@ use wgpu::{
     Backends, CompositeAlphaMode, CurrentSurfaceTexture, Instance, PresentMode, Surface,
     SurfaceConfiguration, SurfaceTexture, TextureFormat, TextureUsages,
 };
+use winit::dpi::PhysicalSize;
 use winit::window::Window;
 
 /// A window's surface.
@@ -39,15 +40,14 @@ impl Screen {
         gpu: &Gpu,
         surface: Surface<'static>,
         window: Arc<Window>,
+        size: PhysicalSize<u32>,
     ) -> Result<Self, GraphicsError> {
         let offers = surface.get_capabilities(gpu.adapter());
-        let srgb = offers.formats.iter().copied().find(TextureFormat::is_srgb);
-        let format = srgb.or_else(|| offers.formats.first().copied());
-        let format = format.ok_or_else(|| refused("it has no format"))?;
+        let format = offers.formats.iter().copied().find(TextureFormat::is_srgb);
+        let format = format.ok_or_else(|| refused("it has no format in sRGB"))?;
         // Whoever renders must not wait for the display, so that the rest of the frame does not.
         let preferred = [PresentMode::Mailbox, PresentMode::Immediate];
         let present_mode = preferred.into_iter().find(|mode| offers.present_modes.contains(mode));
-        let size = window.inner_size();
         let configuration = SurfaceConfiguration {
             usage: TextureUsages::RENDER_ATTACHMENT,
             format,
@@ -72,8 +72,7 @@ impl Screen {
     }
 
     /// Follows the window's size; says whether it is another one. A window without pixels keeps the last.
-    pub(super) fn follow(&mut self, gpu: &Gpu) -> bool {
-        let size = self.window.inner_size();
+    pub(super) fn follow(&mut self, gpu: &Gpu, size: PhysicalSize<u32>) -> bool {
         let most = gpu.most_pixels();
         let (width, height) = (size.width.min(most), size.height.min(most));
         if width == 0 || height == 0 || (width, height) == self.size() {
@@ -82,12 +81,6 @@ impl Screen {
         (self.configuration.width, self.configuration.height) = (width, height);
         self.surface.configure(&gpu.device, &self.configuration);
         true
-    }
-
-    /// Whether there is anything to be seen.
-    pub(super) fn is_visible(&self) -> bool {
-        let size = self.window.inner_size();
-        size.width > 0 && size.height > 0 && self.window.is_minimized() != Some(true)
     }
 
     /// The texture to draw the next picture to; `None` if there is none this time.

@@ -94,7 +94,7 @@ impl<H: Hand> View<H> {
     /// No display, no window, no adapter that can draw to it.
     pub(super) fn open(
         shown: Shown<H>,
-        look: impl FnOnce(Quality) -> (Look, Camera),
+        (look, home): (Look, Camera),
         adapter: Option<&str>,
         controls: Controls,
     ) -> Result<Self, GraphicsError> {
@@ -110,11 +110,12 @@ impl<H: Hand> View<H> {
         let instance = Instance::new(InstanceDescriptor::new_with_display_handle_from_env(display));
         let surface = surface::create(&instance, &window)?;
         let gpu = Gpu::for_surface(&instance, &surface, adapter)?;
-        let screen = Screen::new(&gpu, surface, Arc::clone(&window))?;
+        let screen = Screen::new(&gpu, surface, Arc::clone(&window), input.size)?;
         let overlay_painter = OverlayPainter::new(&gpu, screen.format());
         input.egui = Some(overlay_painter.input(&gpu, &window));
-        let (look, home) = look(quality_for(&gpu));
-        let mut painter = Painter::new(gpu, look, screen.format(), screen.size())?;
+        // What an adapter can draw often enough.
+        let quality = if gpu.is_software() { Quality::Fast } else { Quality::Fine };
+        let mut painter = Painter::new(gpu, look, quality, screen.format(), screen.size())?;
         painter.camera = home;
         let refresh =
             window.current_monitor().and_then(|monitor| monitor.refresh_rate_millihertz());
@@ -150,16 +151,9 @@ impl<H: Hand> View<H> {
         self.failure.clone().or_else(|| self.painter.failure())
     }
 
-    /// Another environment is shown. Where `look` says nothing else, it looks as it did.
-    pub(super) fn turn_to(
-        &mut self,
-        look: impl FnOnce(Quality) -> Option<(Look, Camera)>,
-        mailbox: Mailbox,
-    ) {
-        let before = self.painter.look.focus;
-        if let Some((look, home)) = look(quality_for(self.painter.gpu()))
-            && look.focus != before
-        {
+    /// Another environment is shown. One in the same place is seen as it was.
+    pub(super) fn turn_to(&mut self, (look, home): (Look, Camera), mailbox: Mailbox) {
+        if look.focus != self.painter.look.focus {
             self.painter.look = look;
             (self.painter.camera, self.home) = (home, home);
         }
@@ -183,7 +177,7 @@ impl<H: Hand> View<H> {
         self.input.gestures = gestures;
         let (hand, aim) = self.aimed(self.input.cursor);
         hand.follow(&aim);
-        if !self.is_closing() && self.screen.follow(self.painter.gpu()) {
+        if !self.is_closing() && self.screen.follow(self.painter.gpu(), self.input.size) {
             let (width, height) = self.screen.size();
             if let Err(error) = self.painter.resize(width, height) {
                 self.failure = Some(error);
@@ -212,7 +206,11 @@ impl<H: Hand> View<H> {
                     MouseButton::Left | MouseButton::Right => {
                         painter.camera.orbit(-TURN * by.x, TURN * by.y);
                     }
-                    MouseButton::Middle => painter.camera.pan(Vec2::new(by.x, -by.y)),
+                    MouseButton::Middle => {
+                        let (width, height) = painter.size();
+                        let aspect = width as f32 / height as f32;
+                        painter.camera.pan(Vec2::new(by.x, -by.y), aspect);
+                    }
                     _ => {}
                 }
             }
@@ -235,6 +233,12 @@ impl<H: Hand> View<H> {
         (hand, Aim { painter, mailbox, point })
     }
 
+    /// Whether there is anything to be seen.
+    fn is_visible(&self) -> bool {
+        let size = self.input.size;
+        size.width > 0 && size.height > 0 && self.window.is_minimized() != Some(true)
+    }
+
     /// The objects that come next are shown.
     pub(super) fn show_next(&mut self) {
         self.is_shown = true;
@@ -249,13 +253,13 @@ impl<H: Hand> View<H> {
     /// Draws what was taken, and the overlay, and presents both.
     fn present(&mut self) -> Result<(), GraphicsError> {
         let begun = Instant::now();
-        let gpu = self.painter.gpu();
-        let texture = match self.screen.is_visible() {
-            true => self.screen.next(gpu, &self.instance)?,
+        let texture = match self.is_visible() {
+            true => self.screen.next(self.painter.gpu(), &self.instance)?,
             false => None,
         };
         let Some(texture) = texture else {
             self.painter.discard();
+            self.pace.missed(begun);
             return Ok(());
         };
         let commands = self.encode(&texture.texture);
@@ -315,11 +319,6 @@ impl<H: Hand> View<H> {
     }
 }
 
-/// What an adapter can draw often enough.
-fn quality_for(gpu: &Gpu) -> Quality {
-    if gpu.is_software() { Quality::Fast } else { Quality::Fine }
-}
-
 impl<H: Hand> Renderer for View<H> {
     fn draw(&mut self, object: &Object) {
         self.hand.see(object);
@@ -336,7 +335,7 @@ impl<H: Hand> Renderer for View<H> {
         self.pace.keep(self.controls.is_real_time);
         // What is taken is drawn: else it would be there still when a last picture is taken.
         self.is_shown =
-            !self.is_closing() && self.pace.shows(self.painter.gpu()) && self.screen.is_visible();
+            !self.is_closing() && self.pace.shows(self.painter.gpu()) && self.is_visible();
     }
 
     fn is_bound(&self) -> bool {

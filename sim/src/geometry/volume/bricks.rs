@@ -24,6 +24,10 @@ pub struct Brick<'a> {
     pub place: [u32; 3],
     /// Its voxels along each axis: [`BRICK_SIDE`], or fewer at the volume's far sides.
     pub size: [u32; 3],
+    /// That of its last change. No two changes of a process share one, so that of two bricks of the same
+    /// revision, be it of one volume at two times or of two copies that went different ways, the densities
+    /// are the same. It is never 0.
+    pub revision: u64,
     /// The greatest density in it, of 255.
     pub peak: u8,
     /// The densities, of 255: [`BRICK_SIDE`] slices of as many rows of as many voxels whatever the
@@ -45,10 +49,9 @@ impl Brick<'_> {
     }
 }
 
-/// What is known of a brick.
+/// What is known of a brick; see [`Brick`].
 #[derive(Clone, Copy, Debug)]
 struct Header {
-    /// That of its last change.
     revision: u64,
     peak: u8,
 }
@@ -217,18 +220,14 @@ impl Bricks {
         })
     }
 
-    pub(super) fn changed_since(&self, revision: u64) -> impl Iterator<Item = Brick<'_>> {
-        // Most often nothing has changed, and a volume may have many thousand bricks.
-        let headers = if self.revision > revision { self.headers.as_slice() } else { &[] };
-        let bricks = headers.iter().zip(&self.voxels).enumerate();
-        bricks.filter(move |(_, (header, _))| header.revision > revision).map(
-            |(brick, (header, densities))| {
-                let place = self.layout.place(brick);
-                let span = |axis: usize| self.layout.span(place[axis], axis).len() as u32;
-                let size = std::array::from_fn(span);
-                Brick { place, size, peak: header.peak, densities }
-            },
-        )
+    pub(super) fn iter(&self) -> impl Iterator<Item = Brick<'_>> {
+        let bricks = self.headers.iter().zip(&self.voxels).enumerate();
+        bricks.map(|(brick, (&Header { revision, peak }, densities))| {
+            let place = self.layout.place(brick);
+            let span = |axis: usize| self.layout.span(place[axis], axis).len() as u32;
+            let size = std::array::from_fn(span);
+            Brick { place, size, revision, peak, densities }
+        })
     }
 
     /// Lowers the densities of the voxels in a box, by what `amount` says of a voxel and its density,
@@ -270,7 +269,6 @@ impl Bricks {
         for ((to_header, to), (header, densities)) in
             self.headers.iter_mut().zip(&mut self.voxels).zip(from)
         {
-            // No two changes share a revision, so what has the same one is the same.
             if to_header.revision != header.revision {
                 *to = *densities;
                 *to_header = *header;
@@ -301,11 +299,12 @@ fn part_of_digest(brick: usize, slot: usize, density: u8) -> u64 {
     (mix(number) | 1).wrapping_mul(u64::from(density))
 }
 
-/// A number greater than any before, and never 0. It is of the whole process and not of a volume, so
-/// that a volume which takes the place of another is seen as changed all over.
+/// A number that no other call gives, and never 0. It is of the whole process and not of a volume, so that a
+/// volume which takes the place of another is seen as changed all over, and copies that go different ways are
+/// told apart.
 fn new_revision() -> u64 {
     static LAST: AtomicU64 = AtomicU64::new(0);
-    // Relaxed: no two may be equal, and those of one volume, whose changes come one after the other,
-    // must ascend; the one variable's modification order gives both. Nothing else is published by it.
+    // Relaxed: no two may be equal, which the one variable's modification order gives. Nothing else is
+    // published by it.
     LAST.fetch_add(1, Ordering::Relaxed) + 1
 }

@@ -174,18 +174,18 @@ impl Volume {
         voxels.map(|voxel| self.bricks.get(voxel.map(|index| index as i32)))
     }
 
-    /// The revision of the last change to the densities: greater than that of any volume's change before
-    /// it, and never 0. It says nothing about the state, and differs between runs.
+    /// The revision of the last change to the densities, never 0. No two changes of a process share one: volumes
+    /// of the same revision have the same densities. It says nothing else about the state, and differs between
+    /// runs.
     #[must_use]
     pub fn revision(&self) -> u64 {
         self.bricks.revision()
     }
 
-    /// The bricks changed after `revision`, one that was read off this volume or off one that it is a
-    /// copy of; all of them for 0, and also for a revision of any other volume as long as that was not
-    /// changed after this one was built.
-    pub fn changed_since(&self, revision: u64) -> impl Iterator<Item = Brick<'_>> {
-        self.bricks.changed_since(revision)
+    /// All bricks, those along x fastest. Whoever keeps a copy keeps each brick's [`Brick::revision`] with it, and
+    /// takes over those that have another one.
+    pub fn bricks(&self) -> impl Iterator<Item = Brick<'_>> {
+        self.bricks.iter()
     }
 
     /// A hash over the densities. It takes no time: it is kept up to date.

@@ -129,7 +129,7 @@ impl<'a> Bone<'a> {
     fn gone(&self, skull: &Volume, also: &[&Volume]) -> Vec<u8> {
         let count = self.lattice.dims.iter().map(|&side| side as usize).product();
         let mut gone = vec![0; count];
-        for brick in skull.changed_since(0) {
+        for brick in skull.bricks() {
             if !self.may_hold(brick.first(), BRICK_SIDE) {
                 continue;
             }

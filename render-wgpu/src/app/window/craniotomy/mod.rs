@@ -7,7 +7,7 @@ mod panel;
 use std::sync::Arc;
 
 use dualframe_render_wgpu::camera::Camera;
-use dualframe_render_wgpu::look::{Look, Quality};
+use dualframe_render_wgpu::look::Look;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::device::link::SimulationEnd;
 use dualframe_sim::device::thread::HapticThread;
@@ -71,8 +71,8 @@ impl<'c> Scenario for CraniotomyAtHand<'_, 'c> {
 
     const GRAIN: Grain = Grain::Pairwise;
 
-    fn look(&self, quality: Quality) -> (Look, Camera) {
-        craniotomy::look(self.surgery.region(), quality)
+    fn look(&self) -> (Look, Camera) {
+        craniotomy::look(self.surgery.region())
     }
 
     fn build(&mut self, _hand: &ToolGrip<'c>) -> Result<Scene, RunError> {

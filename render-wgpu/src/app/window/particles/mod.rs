@@ -4,7 +4,7 @@ mod grip;
 mod physics;
 
 use dualframe_render_wgpu::camera::Camera;
-use dualframe_render_wgpu::look::{Look, Quality};
+use dualframe_render_wgpu::look::Look;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::OnFrame;
 use dualframe_sim::manager::VeManager;
@@ -55,9 +55,8 @@ impl Scenario for ParticlesAtHand<'_> {
 
     const GRAIN: Grain = Grain::Spatial;
 
-    fn look(&self, quality: Quality) -> (Look, Camera) {
-        let room = particles::scene_of(self.args, self.objects).room();
-        (Look::room(room, quality), Camera::around(&room))
+    fn look(&self) -> (Look, Camera) {
+        particles::look(particles::scene_of(self.args, self.objects).room())
     }
 
     fn build(&mut self, hand: &Grip) -> Result<Scene, RunError> {
