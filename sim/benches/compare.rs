@@ -63,7 +63,11 @@ fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
     }
     let names: String =
         others.iter().map(|other| format!("  {:>16}", other.executor.name())).collect();
-    println!("\n{}: medians over good rounds (all if none is good)", pipeline.label());
+    println!(
+        "\n{}: medians over good rounds (all if none is good); ceiling: what two independent environments gain, \
+         the median of {GAIN_ROUNDS} measurements after the race, disturbed ones too",
+        pipeline.label()
+    );
     println!("objects  render    ceiling    S_s    E_p  fastest{names}");
     lines.iter().for_each(|line| println!("{line}"));
     Ok(())

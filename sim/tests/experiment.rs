@@ -49,6 +49,7 @@ fn all_experiments() {
     let runners = 1 + 2 * (ExecutorKind::ALL.len() - 1);
     assert_eq!(rows("scalability-rounds.csv"), 2 * 2 * 3);
     assert_eq!(rows("load-balance.csv"), 2 * 2);
+    assert_eq!(rows("load-balance-rounds.csv"), 2 * 2 * 2);
     assert_eq!(rows("per-frame.csv"), 5);
     assert_eq!(rows("per-frame-summary.csv"), 2);
     assert_eq!(rows("per-frame-rounds.csv"), 2 * 2);
@@ -74,8 +75,9 @@ fn all_experiments() {
     for outside in ["src=", "href=", "url(http", "@import", "<script", "<link"] {
         assert!(!page.contains(outside), "{outside}: the page needs nothing else");
     }
-    assert!(page.contains("seed 3") && page.contains("Table 1"));
-    assert!(page.contains("One core is kept for haptics. Only the first 34 of the "));
+    assert!(page.contains("seed 3"));
+    assert!(page.contains("Table 1: seconds that each worker worked per stage over "));
+    assert!(page.contains("draws on it. Frames 33 to 34 of the "));
 }
 
 #[test]
@@ -109,6 +111,8 @@ fn a_plan_that_lacks_something() {
         Plan { per_frame: sweep(&plan.per_frame, &[5, 6]), ..tiny() },
         Plan { per_frame: Sweep { rounds: 0, ..plan.per_frame.clone() }, ..tiny() },
         Plan { compare: sweep(&plan.compare, &[3]), ..tiny() },
+        Plan { compare: Sweep { frames: 0, ..plan.compare.clone() }, ..tiny() },
+        Plan { load_balance: sweep(&plan.load_balance, &[]), ..tiny() },
         Plan { load_balance: Sweep { rounds: 0, ..plan.load_balance.clone() }, ..tiny() },
         Plan { threads: vec![], ..tiny() },
         Plan { threads: vec![2], ..tiny() },

@@ -15,6 +15,14 @@ const SCALE: f32 = 2.0;
 const COLORS: [&str; 7] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000"];
 
+/// Which of so many numbers of threads a figure shows: all, or where colours would not tell them apart the powers of
+/// two and the greatest.
+pub(super) fn drawn(threads: &[usize]) -> impl Iterator<Item = usize> {
+    let (are_few, greatest) = (threads.len() <= COLORS.len(), threads.iter().copied().max());
+    let is_drawn = move |count: usize| count.is_power_of_two() || Some(count) == greatest;
+    threads.iter().copied().filter(move |&count| are_few || is_drawn(count))
+}
+
 /// A drawn figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
@@ -123,6 +131,14 @@ fn plot(line: Line) -> Plot {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_many_numbers_of_threads_some_are_drawn() {
+        let drawn = |cores: usize| drawn(&(1..=cores).collect::<Vec<_>>()).collect::<Vec<_>>();
+        assert_eq!(drawn(6), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(drawn(12), [1, 2, 4, 8, 12]);
+        assert_eq!(drawn(64), [1, 2, 4, 8, 16, 32, 64]);
+    }
 
     #[test]
     fn more_lines_than_colors_are_told_apart() {

@@ -101,16 +101,19 @@ impl Experiment {
     /// Whether a plan has what it takes.
     fn check(self, plan: &Plan) -> Result<(), ExperimentError> {
         let Plan { threads, scalability, load_balance, per_frame, compare, retraction, .. } = plan;
-        let (threads, rounds) = match self {
-            Self::Scalability => (threads, scalability.rounds),
-            Self::LoadBalance => (threads, load_balance.rounds),
-            Self::PerFrame => (threads, per_frame.rounds),
-            Self::Compare => (threads, compare.rounds),
-            Self::Retraction => (&retraction.threads, retraction.rounds),
+        let (threads, rounds, frames) = match self {
+            Self::Scalability => (threads, scalability.rounds, scalability.frames),
+            Self::LoadBalance => (threads, load_balance.rounds, load_balance.frames),
+            Self::PerFrame => (threads, per_frame.rounds, per_frame.frames),
+            Self::Compare => (threads, compare.rounds, compare.frames),
+            Self::Retraction => (&retraction.threads, retraction.rounds, retraction.frames),
         };
         let takes = match self {
             _ if threads.first() != Some(&1) => "numbers of threads, from 1 upwards",
             _ if rounds == 0 => "a round",
+            _ if frames == 0 => "a frame",
+            Self::Scalability if scalability.objects.is_empty() => "a number of objects",
+            Self::LoadBalance if load_balance.objects.is_empty() => "a number of objects",
             Self::PerFrame if per_frame.objects.len() != 1 => "one number of objects",
             Self::Compare if compare.objects.len() != 2 => "two numbers of objects",
             _ => return Ok(()),
@@ -137,7 +140,18 @@ pub struct Report {
     /// What it looks like.
     pub figures: Vec<Figure>,
     /// A table that the page shows, if there is one.
-    pub shown: Option<Table>,
+    pub shown: Option<Shown>,
+}
+
+/// A table on the page.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// What it shows.
+    pub title: String,
+    /// Its rows.
+    pub table: Table,
+    /// What the paper says of it, on its machine of six cores.
+    pub paper: &'static str,
 }
 
 /// Runs experiments one after the other and writes into the folder `out`, which must be there: of each

@@ -1,10 +1,9 @@
 //! One self-contained HTML page of everything that was found.
 
-use super::Report;
 use super::calibrator::Phase;
 use super::machine::Machine;
 use super::plan::Plan;
-use super::table::Table;
+use super::{Report, Shown};
 
 const STYLE: &str = "body{font-family:sans-serif;max-width:60em;margin:2em auto;padding:0 1em;\
     line-height:1.5}figure{margin:2em 0}figure svg{max-width:100%;height:auto}\
@@ -21,10 +20,10 @@ pub(super) fn page(machine: &Machine, plan: &Plan, reports: &[Report]) -> String
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <title>dualframe: experiments</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
          <h1>dualframe: experiments</h1>\n\
-         <p>{machine}; seed {seed}. Medians of interleaved rounds. A round is marked when two \
-         independent threads gain less than {gain} over one, or a ping-pong between them takes more \
-         than {ping_pong} times what is usual; marked rounds are in the CSV files. The paper's values are those \
-         of a 6-core Intel i7-980X.</p>\n{body}</body>\n</html>\n"
+         <p>{machine}; seed {seed}. Medians of interleaved rounds, where nothing else is said. A round is marked \
+         when two independent threads gain less than {gain} over one, or a ping-pong between them takes more \
+         than {ping_pong} times what is usual; that says nothing of further cores. Marked rounds are in the CSV \
+         files. The paper's values are those of a 6-core Intel i7-980X.</p>\n{body}</body>\n</html>\n"
     )
 }
 
@@ -47,15 +46,19 @@ fn drawing(svg: &str) -> &str {
     svg.find("<svg").map_or(svg, |start| &svg[start..])
 }
 
-fn html(table: &Table) -> String {
+fn html(Shown { title, table, paper }: &Shown) -> String {
     let row = |cells: &Vec<String>, tag: &str| {
         let cells: String =
             cells.iter().map(|cell| format!("<{tag}>{}</{tag}>", escaped(cell))).collect();
         format!("<tr>{cells}</tr>\n")
     };
     let rows: String = table.rows.iter().map(|cells| row(cells, "td")).collect();
-    let (name, header) = (escaped(table.name), row(&table.header, "th"));
-    format!("<h2>{name}</h2>\n<table>\n{header}{rows}</table>\n")
+    let (title, header) = (escaped(title), row(&table.header, "th"));
+    let paper = escaped(paper);
+    format!(
+        "<h2>{title}</h2>\n<table>\n{header}{rows}</table>\n\
+         <p class=\"paper\">Paper: {paper}</p>\n"
+    )
 }
 
 fn escaped(text: &str) -> String {

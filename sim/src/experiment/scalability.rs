@@ -1,7 +1,7 @@
 //! Scalability (§7.2.1): Figs. 11 to 13.
 
 use super::error::ExperimentError;
-use super::figure::{Chart, Figure, Line};
+use super::figure::{Chart, Figure, Line, drawn};
 use super::load::RenderLoad;
 use super::outcome::{Outcome, marked};
 use super::race::{Race, Runner, WARM_UP};
@@ -50,7 +50,7 @@ fn throughput(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Experim
         color: 6,
         ..line("serial", outcomes, throughput(Runner::SERIAL))
     }];
-    lines.extend(threads.iter().enumerate().map(|(color, &count)| Line {
+    lines.extend(drawn(threads).enumerate().map(|(color, count)| Line {
         color,
         ..line(&named(count), outcomes, throughput(Runner::pipeline(count)))
     }));
@@ -67,7 +67,12 @@ fn throughput(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Experim
         title: "Throughput".to_owned(),
         x_label: "objects",
         y_label: "frames per second",
-        finding: format!("{}: {}. {}", named(most), ends.join(", "), marked(outcomes)),
+        finding: format!(
+            "{}: {}. {}",
+            named(most),
+            ends.join(", "),
+            marked(outcomes.iter().map(|outcome| &outcome.series))
+        ),
         paper: "Each additional thread increases the throughput (Fig. 11).",
         ..Chart::default()
     }
@@ -76,8 +81,9 @@ fn throughput(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Experim
 
 /// Fig. 12.
 fn speed_ups(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, ExperimentError> {
-    let ideal = |count: usize, color| Line {
-        label: format!("ideal {count}"),
+    let ideal = |count: usize, color: usize| Line {
+        // Where it is says whose it is.
+        label: if color == 0 { "ideal".to_owned() } else { String::new() },
         points: outcomes
             .iter()
             .map(|outcome| (outcome.race.subject.objects() as f64, count as f64))
@@ -86,7 +92,7 @@ fn speed_ups(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Experime
         color,
     };
     let mut lines = Vec::new();
-    for (color, &count) in threads.iter().enumerate() {
+    for (color, count) in drawn(threads).enumerate() {
         lines.push(Line { color, ..line(&named(count), outcomes, speed_up(count)) });
         lines.push(ideal(count, color));
     }
@@ -101,7 +107,7 @@ fn speed_ups(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Experime
         finding: format!(
             "With {} the speed-up is {least:.2} to {greatest:.2}. {}",
             named(most),
-            marked(outcomes)
+            marked(outcomes.iter().map(|outcome| &outcome.series))
         ),
         paper: "Near-linear; it drops by 0.2 to 0.6 % with each 100 further objects (§8.1).",
         ..Chart::default()
@@ -118,7 +124,7 @@ fn efficiencies(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Exper
     let ideal = line("ideal", outcomes, |_| Some(1.0));
     let mut lines = vec![Line { dashed: true, color: 6, ..ideal }];
     lines.extend(
-        threads.iter().enumerate().map(|(color, &count)| Line {
+        drawn(threads).enumerate().map(|(color, count)| Line {
             color,
             ..line(&named(count), outcomes, efficiency(count))
         }),
@@ -130,7 +136,10 @@ fn efficiencies(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Exper
         title: "Thread efficiency".to_owned(),
         x_label: "objects",
         y_label: "efficiency E_p = S_p / p",
-        finding: format!("The efficiency is at least {least:.3}. {}", marked(outcomes)),
+        finding: format!(
+            "The efficiency is at least {least:.3}. {}",
+            marked(outcomes.iter().map(|outcome| &outcome.series))
+        ),
         paper: "Greater than 0.89 in all cases, up to 6 threads and 1,000 objects (§8.1, Fig. 13).",
         ..Chart::default()
     }

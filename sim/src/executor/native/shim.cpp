@@ -35,15 +35,18 @@ void dualframe_openmp_parallel(int threads, void *context,
 }
 
 /// This thread's part of a loop; to be called by every thread of a parallel region.
+///
+/// The loop counts down: what does not divide goes to the first threads, and the last items are scenery, which
+/// takes next to no time. Counting up, the first thread would have a whole block more than the last.
 void dualframe_openmp_static(std::size_t items, void *context,
                              void (*item)(void *, std::size_t)) noexcept {
 #pragma omp for schedule(static) nowait
-    for (std::size_t index = 0; index < items; ++index) {
-        item(context, index);
+    for (std::size_t index = items; index > 0; --index) {
+        item(context, index - 1);
     }
 }
 
-/// As `dualframe_openmp_static`, one item after the other to whoever is free.
+/// This thread's part of a loop, one item after the other to whoever is free.
 void dualframe_openmp_dynamic(std::size_t items, void *context,
                               void (*item)(void *, std::size_t)) noexcept {
 #pragma omp for schedule(dynamic) nowait

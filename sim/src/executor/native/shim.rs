@@ -284,6 +284,22 @@ mod tests {
     }
 
     #[test]
+    fn openmp_static_shares_evenly_what_divides_but_for_the_last() {
+        for (threads, each) in [(2, 2), (2, 5), (3, 2), (4, 3)] {
+            let loops = OpenMp::<false>::new(threads).expect("threads");
+            let mut sharers = vec![usize::MAX; threads * each + 1];
+            loops.for_each(
+                &mut sharers,
+                |worker| worker,
+                |&mut worker, _, sharer| *sharer = worker,
+            );
+            let alike = &sharers[..threads * each];
+            let most = (0..threads).map(|of| alike.iter().filter(|&&it| it == of).count()).max();
+            assert_eq!(most, Some(each), "{threads} threads: {sharers:?}");
+        }
+    }
+
+    #[test]
     fn openmp_dynamic() {
         check::<OpenMp<true>>();
     }

@@ -76,7 +76,7 @@ impl PipelineExecutor {
     /// An executor of `scene` on the threads of `pool`, which may be resized at any time.
     ///
     /// # Errors
-    /// More objects than the grain allows.
+    /// More objects than the grain allows, an object whose number is not its place, or threads that cannot be had.
     pub fn new(
         scene: Scene,
         grain: Grain,
