@@ -245,6 +245,27 @@ fn fades_when_the_pipeline_is_held_up() {
     }
 }
 
+/// A loop of another rate has the same forces, and its limits are those of its rate.
+#[test]
+fn settings_are_of_a_rate() {
+    assert_eq!(ForceSettings::at(1_000.0), ForceSettings::default());
+    let [slow, fast] = [100.0, 4_000.0].map(ForceSettings::at);
+    assert_eq!((slow.max_step, fast.max_step), (5.0, 0.125));
+    assert_eq!((slow.max_damping, fast.max_damping), (5.0, 20.0));
+}
+
+/// No model for ten seconds: it is as old as it was while it was felt.
+#[test]
+fn what_has_faded_grows_no_older() {
+    let settings = ForceSettings::default();
+    let pipeline = Pipeline { held_up: [3.0, 13.0], ..Pipeline::new(Bone::Flat, 60.0, 0.02) };
+    let device = SimulatedDevice::new(Hand::LIGHT, pressing());
+    let seen = run(device, pipeline, settings, 13.0);
+    let age = seen.last().expect("there are ticks").tool.forces.greatest_age;
+    // Three frames, the fade, and what it was when it came.
+    assert!((0.1..0.25).contains(&age), "{age} s");
+}
+
 #[test]
 fn same_inputs_same_bits() {
     let once = || {

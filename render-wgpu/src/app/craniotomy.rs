@@ -77,7 +77,7 @@ fn run_beside<'c>(
     let is_traced = outputs.trace.is_some();
     let spans = if is_traced { TRACED_SPANS } else { SHOWN_SPANS };
     // One more for whoever renders beside rayon's workers.
-    let workers = settings.threads.max(most_threads()) + 1;
+    let workers = most_threads(settings.threads) + 1;
     let timeline = Arc::new(Timeline::new(workers, spans));
     let at_hand = || Ok(CraniotomyAtHand::begin(args, patient, start()?));
     let how = (&args.way, &args.products);

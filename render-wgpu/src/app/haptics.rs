@@ -46,7 +46,7 @@ impl Cells {
         let start = |link: &'c mut HapticLink, mouse: &'c mut Mouse| {
             let (loop_end, end) = link.split();
             let (input, device) = mouse.split();
-            let settings = ForceSettings::default();
+            let settings = ForceSettings::at(rate);
             let thread = HapticThread::spawn(scope, device, loop_end, settings, rate)?;
             Ok::<_, LoopError>((thread, input, end))
         };

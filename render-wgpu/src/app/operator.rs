@@ -37,7 +37,7 @@ impl<'c> Operator<'c> {
             let Some(motion) = surgery.motion(hand) else { continue };
             let (end, simulation) = link.split();
             let device = SimulatedDevice::new(Hand::GUIDED, motion);
-            loops.push(HapticLoop::new(device, end, ForceSettings::default()));
+            loops.push(HapticLoop::new(device, end, ForceSettings::at(rate)));
             surgery.link(hand, simulation);
         }
         Ok(Self { loops, rate, ticks: 0 })

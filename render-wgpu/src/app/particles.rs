@@ -56,7 +56,7 @@ pub(super) fn run(
     let settings = args.way.settings(Grain::Spatial);
     let spans = if args.products.trace.is_some() { TRACED_SPANS } else { SHOWN_SPANS };
     // One more for whoever renders beside rayon's workers.
-    let workers = args.way.threads.max(most_threads()) + 1;
+    let workers = most_threads(args.way.threads) + 1;
     let timeline = Arc::new(Timeline::new(workers, spans));
     let how = (&args.way, &args.products);
     let time_step = ParticleScene::TIME_STEP;

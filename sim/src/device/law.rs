@@ -7,6 +7,7 @@ use super::entry::{SmoothEntry, limited_step};
 use super::figures::Forces;
 use super::model::{Bounded, LocalModel};
 use super::passivity::Passivity;
+use super::thread::RATE;
 use super::watchdog::Watchdog;
 use super::{DeviceDescription, DeviceSample, Wrench};
 
@@ -28,8 +29,8 @@ pub struct ForceSettings {
     /// Usually 0.1: about as fast as a hand reacts to a touch, so that it neither jerks nor sinks far.
     pub fade: f64,
     /// The most damping that the passivity controller adds, in newton seconds per metre; 0 switches it
-    /// off. Usually 20: a fifth of m/T for a device of 0.1 kg at 1 kHz, beyond which damping by the
-    /// speed of the tick before is itself unstable.
+    /// off. Usually 20: a fifth of m/T for a device of m = 0.1 kg at 1 kHz; damping by the speed of the tick
+    /// before is itself unstable beyond m/T.
     pub max_damping: f64,
 }
 
@@ -44,6 +45,20 @@ pub struct SettingsError {
 }
 
 impl ForceSettings {
+    /// The usual settings for a loop at `rate` hertz: forces change as fast as at 1 kHz, and the damping is at most
+    /// half of m/T for a device of m = 0.1 kg. A loop of less than 400 Hz has less of it than bone of 2 kN/m takes.
+    #[must_use]
+    pub fn at(rate: f64) -> Self {
+        Self {
+            max_step: (500.0 / rate) as f32,
+            max_torque_step: (20.0 / rate) as f32,
+            entry: 1.0 / 60.0,
+            timeout: 0.05,
+            fade: 0.1,
+            max_damping: (0.05 * rate).min(20.0),
+        }
+    }
+
     /// The settings themselves if every one of them is a finite number from 0 on.
     ///
     /// # Errors
@@ -63,15 +78,9 @@ impl ForceSettings {
 }
 
 impl Default for ForceSettings {
+    /// Those for a loop at 1 kHz.
     fn default() -> Self {
-        Self {
-            max_step: 0.5,
-            max_torque_step: 0.02,
-            entry: 1.0 / 60.0,
-            timeout: 0.05,
-            fade: 0.1,
-            max_damping: 20.0,
-        }
+        Self::at(RATE)
     }
 }
 
@@ -168,7 +177,8 @@ impl ForceLaw {
         }
         self.last = Some((time, position));
         self.forces.energy(time, &self.passivity);
-        if self.number > 0 {
+        // One that has faded out is not felt any more.
+        if self.number > 0 && share > 0.0 {
             self.forces.aged(time - self.model.model().time);
         }
         self.wrench

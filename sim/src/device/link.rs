@@ -15,11 +15,13 @@ const SLOTS: usize = 3;
 /// The tool, as the haptic loop last had it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolState {
-    /// When it was read, in seconds on the loop's clock; with a fault, when that was tried, and the sample is an older
-    /// one. A local model that is computed from it takes it over.
+    /// When it was read, or that was tried, in seconds on the loop's clock. A local model that is computed from it
+    /// takes it over.
     pub time: f64,
     /// The last sample.
     pub sample: DeviceSample,
+    /// Whether that was read then; else it is an older one.
+    pub is_fresh: bool,
     /// What is being exerted.
     pub wrench: Wrench,
     /// Why the device cannot be read or written just now, if it cannot.
@@ -36,6 +38,7 @@ impl ToolState {
         Self {
             time: 0.0,
             sample: DeviceSample::at(Vec3::ZERO),
+            is_fresh: false,
             wrench: Wrench::default(),
             fault: None,
             ticks: Ticks::default(),

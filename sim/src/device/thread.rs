@@ -89,15 +89,15 @@ impl<'c, D: HapticDevice> HapticLoop<'c, D> {
         };
         let written = self.device.write(wrench);
         self.sample = read.unwrap_or(self.sample);
-        self.publish(wrench, read.err().or(written.err()));
+        self.publish(wrench, read.is_ok(), read.err().or(written.err()));
         wrench
     }
 
-    fn publish(&mut self, wrench: Wrench, fault: Option<DeviceError>) {
+    fn publish(&mut self, wrench: Wrench, is_fresh: bool, fault: Option<DeviceError>) {
         self.ticks.failed += u64::from(fault.is_some());
         let (time, sample, ticks, forces) =
             (self.time, self.sample, self.ticks, *self.law.forces());
-        self.end.publish(ToolState { time, sample, wrench, fault, ticks, forces });
+        self.end.publish(ToolState { time, sample, is_fresh, wrench, fault, ticks, forces });
     }
 
     /// The device.
@@ -178,7 +178,7 @@ impl<D: HapticDevice> HapticLoop<'_, D> {
         // A device that cannot be told to let go now lets go by its own watchdog.
         let _ = catch_unwind(AssertUnwindSafe(|| self.device.write(Wrench::default())));
         if ticking.is_err() {
-            self.publish(Wrench::default(), Some(DeviceError::Panicked));
+            self.publish(Wrench::default(), false, Some(DeviceError::Panicked));
         }
     }
 

@@ -6,9 +6,9 @@ use dualframe_sim::pool::cores;
 
 use crate::app::args::Way;
 
-/// The most workers that can be asked for at the window: more than anybody has use for.
-pub(in crate::app) fn most_threads() -> usize {
-    MAX_THREADS.min(4 * cores())
+/// The most workers that can be asked for at a window that was opened with so many: more than anybody has use for.
+pub(in crate::app) fn most_threads(threads: usize) -> usize {
+    MAX_THREADS.min(4 * cores()).max(threads)
 }
 
 /// What the person at the window can change. The overlay writes it; between two runs of frames the
@@ -21,6 +21,8 @@ pub(in crate::app) struct Controls {
     /// Whether simulated time does not run ahead of the clock.
     pub(super) is_real_time: bool,
     pub(super) threads: usize,
+    /// The most that can be asked for.
+    pub(super) most_threads: usize,
     pub(super) frames_in_flight: u8,
     pub(super) executor: ExecutorKind,
     pub(super) coloring: Coloring,
@@ -37,6 +39,7 @@ impl Controls {
             steps: 0,
             is_real_time: true,
             threads: way.threads,
+            most_threads: most_threads(way.threads),
             frames_in_flight: way.frames_in_flight,
             executor: way.executor,
             coloring: Coloring::default(),

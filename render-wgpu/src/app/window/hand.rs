@@ -106,7 +106,8 @@ pub(in crate::app) trait Hand: Send {
         let _ = object;
     }
 
-    /// All objects of a frame were shown, and the mouse is here now.
+    /// A frame has passed, all its objects were shown, and the mouse is here now. Not called while time stands still,
+    /// in which hands would get nowhere either.
     fn follow(&mut self, aim: &Aim<'_>);
 
     /// Marks in the picture what the person should see.

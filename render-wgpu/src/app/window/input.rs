@@ -81,13 +81,16 @@ impl Input {
     }
 
     fn key(&mut self, event: &KeyEvent) {
-        if event.state != ElementState::Pressed {
+        let key = event.logical_key.as_ref();
+        let is_step = matches!(key, Key::Character("n" | "N"));
+        // A key that is held steps on, and does nothing else again.
+        if event.state != ElementState::Pressed || (event.repeat && !is_step) {
             return;
         }
-        self.gestures.extend(match event.logical_key.as_ref() {
+        self.gestures.extend(match key {
             Key::Named(NamedKey::Space) => Some(Gesture::Pause),
             Key::Named(NamedKey::Home) => Some(Gesture::ResetCamera),
-            Key::Character("n" | "N") => Some(Gesture::Step),
+            Key::Character(_) if is_step => Some(Gesture::Step),
             Key::Character("h" | "H") => Some(Gesture::Overlay),
             Key::Character(text) => {
                 text.chars().next().map(|key| Gesture::Key(key.to_ascii_lowercase()))

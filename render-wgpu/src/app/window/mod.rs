@@ -148,9 +148,10 @@ impl<'a, S: Scenario> Session<'a, S> {
         self.view.turn_to(self.scenario.look(), manager.mailbox());
         let mut left = frames.unwrap_or(u64::MAX);
         while left > 0 && !self.view.is_closing() {
-            manager = self.apply(manager, &mut recording)?;
+            manager = self.apply(manager, &mut recording, measure)?;
             let controls = &mut self.view.controls;
-            let wanted = match (controls.is_paused, std::mem::take(&mut controls.steps)) {
+            let is_paused = controls.is_paused;
+            let wanted = match (is_paused, std::mem::take(&mut controls.steps)) {
                 (false, _) => self.frames_of_a_run(),
                 (true, steps) => steps,
             };
@@ -159,9 +160,15 @@ impl<'a, S: Scenario> Session<'a, S> {
                 measure.interrupt();
                 continue;
             }
+            // Not before time goes on: what is told meanwhile would pile up.
+            self.scenario.apply(&self.view.hand, &mut manager, &mut recording)?;
             let before = manager.frame();
             manager = self.advance(manager, &mut recording, wanted.min(left), measure)?;
-            left -= manager.frame() - before;
+            let done = manager.frame() - before;
+            left -= done;
+            if is_paused {
+                self.view.controls.steps += wanted - done;
+            }
         }
         recording.end(&manager);
         let drawn = match (self.view.failure(), picture) {
@@ -219,10 +226,12 @@ impl<'a, S: Scenario> Session<'a, S> {
         &mut self,
         mut manager: VeManager,
         recording: &mut Recording<'_>,
+        measure: &mut Measure<'_>,
     ) -> Result<VeManager, RunError> {
         let (now, before) = (self.view.controls, self.applied);
         self.applied = now;
-        if now.restarts != before.restarts {
+        let is_restarted = now.restarts != before.restarts;
+        if is_restarted {
             if recording.end(&manager) {
                 let frame = manager.frame();
                 self.told.note(&format!("the recording ends before frame {frame}: started anew"));
@@ -238,8 +247,12 @@ impl<'a, S: Scenario> Session<'a, S> {
             self.spent.add(&manager.stage_seconds());
             manager = self.manage(manager.into_scene())?;
         }
+        if is_restarted || is_rebuilt {
+            // That was no frame's time.
+            self.view.interrupt();
+            measure.interrupt();
+        }
         manager.pool().resize(now.threads);
-        self.scenario.apply(&self.view.hand, &mut manager, recording)?;
         Ok(manager)
     }
 

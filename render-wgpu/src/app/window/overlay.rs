@@ -9,7 +9,7 @@ use dualframe_sim::timeline::{Span, Timeline};
 use egui::{Checkbox, ComboBox, Grid, LayerId, Slider, Ui};
 
 use super::charts;
-use super::controls::{Controls, most_threads};
+use super::controls::Controls;
 use super::hand::{Hand, Marks};
 use super::stats::Stats;
 
@@ -115,11 +115,11 @@ fn executor_controls(ui: &mut Ui, controls: &mut Controls) {
         );
         ui.end_row();
         ui.label("workers");
-        let most = most_threads().max(controls.threads);
-        ui.add(Slider::new(&mut controls.threads, 1..=most));
+        let workers = Slider::new(&mut controls.threads, 1..=controls.most_threads);
+        ui.add_enabled(controls.executor != ExecutorKind::Serial, workers);
         ui.end_row();
         ui.label("frames in flight");
-        ui.horizontal(|ui| {
+        ui.add_enabled_ui(controls.executor == ExecutorKind::Pipeline, |ui| {
             ui.selectable_value(&mut controls.frames_in_flight, 1, "1");
             ui.selectable_value(&mut controls.frames_in_flight, 2, "2");
         });

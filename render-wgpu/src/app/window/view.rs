@@ -175,8 +175,6 @@ impl<H: Hand> View<H> {
         }
         // The list keeps its memory.
         self.input.gestures = gestures;
-        let (hand, aim) = self.aimed(self.input.cursor);
-        hand.follow(&aim);
         if !self.is_closing() && self.screen.follow(self.painter.gpu(), self.input.size) {
             let (width, height) = self.screen.size();
             if let Err(error) = self.painter.resize(width, height) {
@@ -332,6 +330,8 @@ impl<H: Hand> Renderer for View<H> {
             self.redraw();
         }
         self.attend(Duration::ZERO);
+        let (hand, aim) = self.aimed(self.input.cursor);
+        hand.follow(&aim);
         self.pace.keep(self.controls.is_real_time);
         // What is taken is drawn: else it would be there still when a last picture is taken.
         self.is_shown =

@@ -180,7 +180,7 @@ impl<'c> Feel<'c> {
     /// The device now, as far as its loop has said anything that counts.
     fn said(&mut self) -> Option<ToolState> {
         let now = self.end.tool();
-        (now.time > 0.0 && now.fault.is_none()).then_some(now)
+        now.is_fresh.then_some(now)
     }
 
     /// The device in the frame that is being drawn.

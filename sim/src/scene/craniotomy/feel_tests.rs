@@ -39,8 +39,8 @@ impl Surface for Flat {
     }
 }
 
-/// A device that goes its way whatever it is told to exert.
-struct Led(Motion);
+/// A device that goes its way whatever it is told to exert, which it may refuse.
+struct Led(Motion, Result<(), DeviceError>);
 
 impl HapticDevice for Led {
     fn description(&self) -> DeviceDescription {
@@ -52,7 +52,7 @@ impl HapticDevice for Led {
     }
 
     fn write(&mut self, _wrench: Wrench) -> Result<(), DeviceError> {
-        Ok(())
+        self.1
     }
 }
 
@@ -73,8 +73,12 @@ struct Hand<'c> {
 
 impl<'c> Hand<'c> {
     fn new(link: &'c mut HapticLink, motion: &Motion) -> Self {
+        Self::with(Led(motion.clone(), Ok(())), link)
+    }
+
+    fn with(device: Led, link: &'c mut HapticLink) -> Self {
         let (end, simulation) = link.split();
-        let ticking = HapticLoop::new(Led(motion.clone()), end, ForceSettings::default());
+        let ticking = HapticLoop::new(device, end, ForceSettings::default());
         Self { ticking, feel: Feel::new(simulation) }
     }
 
@@ -178,6 +182,22 @@ fn a_burr_feels_the_same_in_any_order_of_drawing() {
     let changes = [(40, Instrument::Elevator), (60, Instrument::Burr)];
     let felt = felt_in_any_order(Instrument::Burr, &motion, &changes, 80);
     assert!(felt > 30, "something was felt in {felt} frames");
+}
+
+/// A device whose amplifier has tripped can be read: its tool follows the hand, which feels nothing.
+#[test]
+fn a_device_that_cannot_be_written_leads_its_tool() {
+    let (from, to) = (LID + Vec3::Z * 0.02, LID + Vec3::Z * 0.03);
+    let motion = way(&[(0, from, false), (10, to, false)]);
+    let mut link = HapticLink::new();
+    let mut hand = Hand::with(Led(motion, Err(DeviceError::Driver { code: 7 })), &mut link);
+    let mut executor = scene(Instrument::Elevator, from);
+    let mut place = from;
+    for _ in 0..12 {
+        executor.advance(1, &mut NullRenderer::new(), &mut |_| {}).expect("no table is full");
+        place = hand.frame(&executor, &ORDERS[0]).1.position;
+    }
+    assert!(place.distance(to) < 1e-6, "{place}");
 }
 
 /// Bone that is drawn no more, since it was removed or hidden, neither pushes a hand nor holds its tool out.
