@@ -14,9 +14,15 @@ use crate::unit::{NONE, UnitId};
 /// others write of a unit is side by side in the first.
 #[derive(Debug)]
 #[repr(C)]
-// Two lines where they are fetched in pairs.
-#[cfg_attr(any(target_arch = "x86_64", target_arch = "aarch64"), repr(align(128)))]
-#[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), repr(align(64)))]
+// Where lines are of 128 bytes, or are fetched in pairs.
+#[cfg_attr(
+    any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "powerpc64"),
+    repr(align(128))
+)]
+#[cfg_attr(
+    not(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "powerpc64")),
+    repr(align(64))
+)]
 pub struct UnitSlot<O> {
     /// What has to happen before the unit's next update: its interactions, the opening of the
     /// frame, and its rendering in the frame before; and the list of the interactions.

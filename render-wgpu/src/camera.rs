@@ -191,21 +191,25 @@ mod tests {
     fn unprojects_what_it_projects() {
         let camera = camera();
         let place = Vec3::new(0.3, -0.2, 0.4);
-        let clip = camera.view_projection(1.5).project_point3(place);
-        let back = camera.unproject(clip.truncate(), 1.5, place);
-        assert!(back.distance(place) < 1e-4, "{back}");
-        let direction = camera.direction(clip.truncate(), 1.5);
-        let there = camera.eye() + direction * camera.eye().distance(place);
-        assert!(there.distance(place) < 1e-4, "{there}");
+        for aspect in [0.5, 1.5] {
+            let clip = camera.view_projection(aspect).project_point3(place);
+            let back = camera.unproject(clip.truncate(), aspect, place);
+            assert!(back.distance(place) < 1e-4, "{back}");
+            let direction = camera.direction(clip.truncate(), aspect);
+            let there = camera.eye() + direction * camera.eye().distance(place);
+            assert!(there.distance(place) < 1e-4, "{there}");
+        }
     }
 
     #[test]
     fn panning_moves_the_picture_with_the_hand() {
-        let mut camera = camera();
-        let target = camera.target;
-        camera.pan(Vec2::new(0.25, 0.0), 1.0);
-        // A quarter of the height to the right is half a unit of clip space at an aspect of 1.
-        let moved = camera.view_projection(1.0).project_point3(target);
-        assert!((moved.x - 0.5).abs() < 1e-4 && moved.y.abs() < 1e-4, "{moved}");
+        for aspect in [0.5, 1.0, 2.0] {
+            let mut camera = camera();
+            let target = camera.target;
+            camera.pan(Vec2::new(0.25, 0.0), aspect);
+            // Clip space is two units wide.
+            let moved = camera.view_projection(aspect).project_point3(target);
+            assert!((moved.x * aspect - 0.5).abs() < 1e-4 && moved.y.abs() < 1e-4, "{moved}");
+        }
     }
 }

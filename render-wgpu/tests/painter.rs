@@ -6,7 +6,6 @@ use std::sync::mpsc::{Receiver, channel};
 use dualframe_render_wgpu::gpu::Gpu;
 use dualframe_render_wgpu::look::{Coloring, Look, Quality};
 use dualframe_render_wgpu::pick::{Pick, Picked};
-use dualframe_render_wgpu::picture::Picture;
 use dualframe_render_wgpu::renderer::Offscreen;
 use dualframe_sim::behavior::Fixed;
 use dualframe_sim::geometry::{Bounds, Geometry, Mesh, Rigid, Topology};
@@ -73,10 +72,15 @@ fn pictures_follow_the_size() {
     }
 }
 
-/// The colour of the middle of a picture.
-fn middle(picture: &Picture) -> [u8; 3] {
+/// The colour of a place in the last frame's picture.
+fn color_at(offscreen: &Offscreen, place: Vec3) -> [u8; 3] {
+    let picture = offscreen.picture().expect("the device works");
+    let aspect = picture.width as f32 / picture.height as f32;
+    let clip = offscreen.painter.camera.view_projection(aspect).project_point3(place);
+    let [x, y] =
+        [(0.5 + 0.5 * clip.x) * picture.width as f32, (0.5 - 0.5 * clip.y) * picture.height as f32];
     let (pixels, _) = picture.pixels.as_chunks::<4>();
-    let [r, g, b, _] = pixels[(picture.height / 2 * picture.width + picture.width / 2) as usize];
+    let [r, g, b, _] = pixels[y as usize * picture.width as usize + x as usize];
     [r, g, b]
 }
 
@@ -90,7 +94,7 @@ fn a_rigid_shape_has_a_speed() {
         object.geometry.as_rigid_mut().expect("a ball").velocity = Vec3::X * speed;
         offscreen.draw(&object);
         offscreen.swap(0);
-        middle(&offscreen.picture().expect("the device works"))
+        color_at(&offscreen, Vec3::ZERO)
     };
     let (rest, slow, fast) = (at(0.0), at(1.0), at(3.0));
     assert!(rest.into_iter().all(|channel| channel < 80), "{rest:?}");
@@ -98,25 +102,27 @@ fn a_rigid_shape_has_a_speed() {
     assert!(fast.into_iter().all(|channel| channel > 120), "not white: {fast:?}");
 }
 
-/// A flat box seen from above, so far below what light and shadow are fitted to.
 #[test]
 #[ignore = "needs a graphics adapter; .ci/run has one"]
-fn what_the_light_does_not_reach_is_not_in_shadow() {
+fn beyond_the_lights_reach_there_are_only_shadows_of_what_is_within_it() {
     let mut offscreen = offscreen();
-    offscreen.painter.look.room = false;
-    offscreen.painter.look.light = Vec3::Y;
+    offscreen.painter.look = Look { room: false, light: Vec3::Y, ..offscreen.painter.look };
     offscreen.painter.camera.pitch = 1.4;
-    let mut below = |depth: f32| {
+    // A flat box below a ball; the light's reach ends at a depth of 1 m.
+    let mut seen = |depth: f32| {
         let shape = SharedShape::cuboid(0.8, 0.01, 0.8);
         let pose = Pose::from_translation(Vec3::NEG_Y * depth);
         let geometry = Geometry::Rigid(Rigid::new(shape, pose));
         offscreen.draw(&Object::new(ObjectId(0), Group(0), geometry, Fixed));
+        offscreen.draw(&ball(1, Vec3::X * 0.5));
         offscreen.swap(0);
-        middle(&offscreen.picture().expect("the device works"))
+        [0.0, 0.5].map(|x| color_at(&offscreen, Vec3::new(x, -depth, 0.0)))
     };
-    let (inside, outside) = (below(0.9), below(1.5));
-    let differ = inside.iter().zip(outside).any(|(a, b)| a.abs_diff(b) > 20);
-    assert!(!differ, "{inside:?} within, {outside:?} below");
+    let differ = |a: [u8; 3], b: [u8; 3]| a.iter().zip(b).any(|(a, b)| a.abs_diff(b) > 20);
+    let ([lit, shaded], [lit_below, shaded_below]) = (seen(0.9), seen(1.5));
+    assert!(differ(lit, shaded), "the ball throws no shadow");
+    assert!(!differ(lit, lit_below), "{lit:?} within, {lit_below:?} below");
+    assert!(!differ(shaded, shaded_below), "{shaded:?} within, {shaded_below:?} below");
 }
 
 #[test]

@@ -25,8 +25,9 @@ const SUN = vec3f(2.3, 2.15, 1.9);
 const SKY = vec3f(0.52, 0.62, 0.78);
 const GROUND = vec3f(0.30, 0.26, 0.23);
 
+// What is farther from the light than the map reaches is in the shadow of what is in the map, and not of nothing.
 fn lit_at(uv: vec2f, depth: f32) -> f32 {
-    return textureSampleCompareLevel(shadow_map, shadow_sampler, uv, depth);
+    return textureSampleCompareLevel(shadow_map, shadow_sampler, uv, min(depth, 1.0));
 }
 
 // How much of the light reaches a place, and how much of the sky seems to.
@@ -35,8 +36,7 @@ fn shadow(position: vec3f, normal: vec3f) -> vec2f {
     let off = position + normal * (1.5 * globals.shadow_texel);
     let clip = globals.light_projection * vec4f(off, 1.0);
     let uv = clip.xy * vec2f(0.5, -0.5) + 0.5;
-    // What lies beside the map, or farther from the light than it reaches, is in nobody's shadow.
-    if any(uv < vec2f(0.0)) || any(uv > vec2f(1.0)) || clip.z > 1.0 {
+    if any(uv < vec2f(0.0)) || any(uv > vec2f(1.0)) {
         return vec2f(1.0);
     }
     if globals.quality == 0u {

@@ -67,9 +67,9 @@ pub(super) fn retraction(laboratory: &mut Laboratory<'_>) -> Result<Report, Expe
 /// Which frames are timed, and what of them is not a retraction.
 fn frames_of(subject: &Subject, frames: u64) -> String {
     let (script, first, last) = (subject.script_frames(), WARM_UP + 1, WARM_UP + frames);
-    match last < script {
+    match last <= script {
         true => format!("Frames {first} to {last} of the {script} in which the hands move"),
-        false => format!("Frames {first} to {last}, of which the hands move in the first {script}"),
+        false => format!("Frames {first} to {last}; the hands move up to frame {script}"),
     }
 }
 
@@ -142,7 +142,7 @@ impl Study<'_> {
             x_label: "threads",
             y_label: "speed-up S_s = T_s / T_p",
             x_counts: true,
-            finding: self.finding(outcome) + &self.note + PEERS + &marked([&outcome.series]),
+            finding: self.finding(outcome) + &self.note + PEERS + &marked([outcome]),
             paper: self.paper,
         }
         .lines(lines.collect())

@@ -158,9 +158,9 @@ impl Outcome {
 }
 
 /// How many rounds of some races were marked, in words.
-pub(super) fn marked<'a>(timed: impl IntoIterator<Item = &'a Series>) -> String {
+pub(super) fn marked<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>) -> String {
     let (mut all, mut left_out, mut shown) = (0, 0, 0);
-    for series in timed {
+    for Outcome { series, .. } in outcomes {
         all += series.rounds().len();
         match series.best_rounds() {
             Rounds::Good => left_out += series.marked(),

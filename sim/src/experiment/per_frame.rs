@@ -138,7 +138,7 @@ impl Frames {
             y_label: "speed-up S_p = T_1 / T_p",
             finding: finding.collect::<String>()
                 + "A frame's is the median over rounds, which varies less than one round's. "
-                + &marked([&self.outcome.series]),
+                + &marked([&self.outcome]),
             paper: "Level, whatever the number of collisions; variance 0.001 to 0.08 with 2 to 6 \
                     threads (§8.2).",
             ..Chart::default()

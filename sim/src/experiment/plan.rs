@@ -37,7 +37,7 @@ pub struct Retraction {
 }
 
 impl Retraction {
-    /// On so many cores, of which one is kept for haptics if there are more than two, as in the paper
+    /// On so many cores, of which one is left free as for haptics if there are more than two, as in the paper
     /// (Fig. 18).
     fn on(cores: usize, frames: u64, rounds: usize) -> Self {
         let keeps_core = cores > 2;

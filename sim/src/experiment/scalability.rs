@@ -67,12 +67,7 @@ fn throughput(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Experim
         title: "Throughput".to_owned(),
         x_label: "objects",
         y_label: "frames per second",
-        finding: format!(
-            "{}: {}. {}",
-            named(most),
-            ends.join(", "),
-            marked(outcomes.iter().map(|outcome| &outcome.series))
-        ),
+        finding: format!("{}: {}. {}", named(most), ends.join(", "), marked(outcomes)),
         paper: "Each additional thread increases the throughput (Fig. 11).",
         ..Chart::default()
     }
@@ -107,7 +102,7 @@ fn speed_ups(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Experime
         finding: format!(
             "With {} the speed-up is {least:.2} to {greatest:.2}. {}",
             named(most),
-            marked(outcomes.iter().map(|outcome| &outcome.series))
+            marked(outcomes)
         ),
         paper: "Near-linear; it drops by 0.2 to 0.6 % with each 100 further objects (§8.1).",
         ..Chart::default()
@@ -136,10 +131,7 @@ fn efficiencies(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Exper
         title: "Thread efficiency".to_owned(),
         x_label: "objects",
         y_label: "efficiency E_p = S_p / p",
-        finding: format!(
-            "The efficiency is at least {least:.3}. {}",
-            marked(outcomes.iter().map(|outcome| &outcome.series))
-        ),
+        finding: format!("The efficiency is at least {least:.3}. {}", marked(outcomes)),
         paper: "Greater than 0.89 in all cases, up to 6 threads and 1,000 objects (§8.1, Fig. 13).",
         ..Chart::default()
     }

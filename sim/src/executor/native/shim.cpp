@@ -36,8 +36,8 @@ void dualframe_openmp_parallel(int threads, void *context,
 
 /// This thread's part of a loop; to be called by every thread of a parallel region.
 ///
-/// The loop counts down: what does not divide goes to the first threads, and the last items are scenery, which
-/// takes next to no time. Counting up, the first thread would have a whole block more than the last.
+/// The loop counts down: GCC gives what does not divide to the first threads, and the last block of a room is its
+/// walls, which take next to no time. Counting up, the first thread would have two blocks more than the last.
 void dualframe_openmp_static(std::size_t items, void *context,
                              void (*item)(void *, std::size_t)) noexcept {
 #pragma omp for schedule(static) nowait

@@ -25,8 +25,8 @@ pub struct Brick<'a> {
     /// Its voxels along each axis: [`BRICK_SIDE`], or fewer at the volume's far sides.
     pub size: [u32; 3],
     /// That of its last change. No two changes of a process share one, so that of two bricks of the same
-    /// revision, be it of one volume at two times or of two copies that went different ways, the densities
-    /// are the same. It is never 0.
+    /// revision at the same place, be it of one volume at two times or of two copies that went different ways, the
+    /// densities are the same. It is never 0.
     pub revision: u64,
     /// The greatest density in it, of 255.
     pub peak: u8,
