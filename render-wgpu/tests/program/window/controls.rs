@@ -1,5 +1,6 @@
 //! What the overlay can change of how frames are run.
 
+use crate::command::{read_json, run};
 use serde_json::Value;
 
 use super::desktop::{Desktop, Session};
@@ -74,4 +75,32 @@ fn a_new_start() {
     let report = session.close();
     assert!(report["frames"].as_u64() > Some(1), "frames before it count: {}", report["frames"]);
     assert_eq!(report["state_hash"], untouched(&ONE, &Value::from(1)));
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn what_is_set_while_time_stands_still_is_told_once() {
+    let desktop = Desktop::start();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = |name| folder.path().join(name).to_str().expect("a plain path").to_owned();
+    let (recording, json) = (file("session"), file("replay.json"));
+    let mut session = desktop.open(&[&ONE[..], &["--record", &recording]].concat());
+    session.strike(' ');
+    let paused = session.wait_until_still();
+    // Below that of gravity, which is no object's.
+    let (_, stiffness) = paused.sliders()[1];
+    for right in [10, 20, 30] {
+        session.click(COLUMN + right, stiffness);
+        session.wait_until_still();
+    }
+    session.strike('n');
+    session.wait_until_still();
+    let report = session.close();
+    let output = run(&["replay", &recording, "--json", &json]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let replayed = read_json(json.as_ref());
+    assert_eq!(
+        (&replayed["messages"], &replayed["state_hash"]),
+        (&Value::from(1), &report["state_hash"])
+    );
 }
