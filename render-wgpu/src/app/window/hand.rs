@@ -106,9 +106,9 @@ pub(in crate::app) trait Hand: Send {
         let _ = object;
     }
 
-    /// A frame has passed, all its objects were shown, and the mouse is here now. Not called while time stands still,
-    /// in which hands would get nowhere either.
-    fn follow(&mut self, aim: &Aim<'_>);
+    /// All objects of a frame were shown, and the mouse is here now. Where no time has passed since the last frame a
+    /// hand gets nowhere.
+    fn follow(&mut self, aim: &Aim<'_>, has_time_passed: bool);
 
     /// Marks in the picture what the person should see.
     fn mark(&self, marks: &Marks<'_>) {

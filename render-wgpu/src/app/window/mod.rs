@@ -218,6 +218,7 @@ impl<'a, S: Scenario> Session<'a, S> {
         self.take(manager);
         self.view.redraw();
         self.view.attend(IDLE);
+        self.view.follow(false);
         self.view.interrupt();
     }
 

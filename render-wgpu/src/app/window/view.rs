@@ -222,6 +222,12 @@ impl<H: Hand> View<H> {
         }
     }
 
+    /// The hand follows the mouse.
+    pub(super) fn follow(&mut self, has_time_passed: bool) {
+        let (hand, aim) = self.aimed(self.input.cursor);
+        hand.follow(&aim, has_time_passed);
+    }
+
     /// The hand, and what it aims at with the mouse at a pixel of the window.
     fn aimed(&mut self, cursor: Vec2) -> (&mut H, Aim<'_>) {
         let Self { hand, painter, mailbox, .. } = self;
@@ -330,8 +336,7 @@ impl<H: Hand> Renderer for View<H> {
             self.redraw();
         }
         self.attend(Duration::ZERO);
-        let (hand, aim) = self.aimed(self.input.cursor);
-        hand.follow(&aim);
+        self.follow(true);
         self.pace.keep(self.controls.is_real_time);
         // What is taken is drawn: else it would be there still when a last picture is taken.
         self.is_shown =

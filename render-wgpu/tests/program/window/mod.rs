@@ -85,6 +85,24 @@ fn a_drag_moves_a_particle() {
 
 #[test]
 #[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn one_looks_round_while_time_stands_still() {
+    let desktop = Desktop::start();
+    let mut session = desktop.open(&ONE);
+    session.strike(' ');
+    session.strike('h');
+    let before = session.wait_until_still();
+    session.move_to(20, 20);
+    session.press(true);
+    // It takes a picture until it is known that nothing is there to be pulled.
+    sleep(STILL);
+    session.move_to(120, 20);
+    session.wait_for("another view", |now| now.difference(&before) > 1_000);
+    session.press(false);
+    session.close();
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
 fn the_slider_of_gravity_lets_a_particle_fall() {
     let desktop = Desktop::start();
     let mut session = desktop.open(&ONE);

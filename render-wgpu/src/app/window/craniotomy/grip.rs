@@ -154,10 +154,10 @@ impl Hand for ToolGrip<'_> {
         }
     }
 
-    fn follow(&mut self, aim: &Aim<'_>) {
+    fn follow(&mut self, aim: &Aim<'_>, has_time_passed: bool) {
         let (eye, direction) = self.sight.replace(aim.ray()).unwrap_or_default();
         let under = self.distance.take().map(|distance| eye + direction * distance);
-        if !self.is_free {
+        if !(self.is_free && has_time_passed) {
             return;
         }
         self.take_up(aim.mailbox);

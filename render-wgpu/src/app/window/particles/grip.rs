@@ -63,7 +63,7 @@ impl Hand for Grip {
         matches!(self.held, Held::Asked(_) | Held::Object(..))
     }
 
-    fn follow(&mut self, aim: &Aim<'_>) {
+    fn follow(&mut self, aim: &Aim<'_>, has_time_passed: bool) {
         if let Held::Asked(answered) = &self.held {
             self.held = match answered.try_recv() {
                 Ok(Some(picked)) => Held::Object(picked, None),
@@ -71,7 +71,9 @@ impl Hand for Grip {
                 Err(TryRecvError::Empty) => return,
             };
         }
-        if let Held::Object(Picked { object, node, place }, pulled) = &mut self.held {
+        if let Held::Object(Picked { object, node, place }, pulled) = &mut self.held
+            && has_time_passed
+        {
             let target = aim.at_depth_of(*place);
             if pulled.replace(target) != Some(target) {
                 let (node, target) = (*node, target.to_array());
