@@ -118,6 +118,12 @@ impl Painter {
         (self.target.width, self.target.height)
     }
 
+    /// How many times the pictures are as wide as high.
+    #[must_use]
+    pub fn aspect(&self) -> f32 {
+        self.target.aspect()
+    }
+
     /// Why nothing is drawn any more, if so. The objects go on without pictures.
     #[must_use]
     pub fn failure(&self) -> Option<GraphicsError> {

@@ -31,9 +31,10 @@ impl Cells {
 
     /// Takes over a brick that changed.
     pub(super) fn take(&mut self, brick: &Brick<'_>) {
+        let place = brick.place();
         for part in 0..8_u32 {
             let offset = [part & 1, part >> 1 & 1, part >> 2];
-            let block: [u32; 3] = std::array::from_fn(|axis| 2 * brick.place[axis] + offset[axis]);
+            let block: [u32; 3] = std::array::from_fn(|axis| 2 * place[axis] + offset[axis]);
             let Some(number) = self.number(block) else { continue };
             self.blocks[number] = block_peaks(brick, offset);
             let [from, to] = &mut self.changed;

@@ -119,8 +119,8 @@ impl Grid {
             self.cells.take(&brick);
             // Bricks in a row are sent by one call: each is a buffer of the device's own.
             let first = *begin.get_or_insert(brick.first());
-            let [x, y, z] = brick.place;
-            if bricks.peek().is_none_or(|next| next.place != [x + 1, y, z]) {
+            let [x, y, z] = brick.place();
+            if bricks.peek().is_none_or(|next| next.place() != [x + 1, y, z]) {
                 self.send_row(queue, first, brick);
                 begin = None;
             }
@@ -137,7 +137,7 @@ impl Grid {
         let wide = self.dims[0].div_ceil(BRICK_SIDE) as usize;
         let (rows, _) = self.staged.as_chunks_mut::<{ BRICK_SIDE as usize }>();
         let (from, _) = brick.densities.as_chunks::<{ BRICK_SIDE as usize }>();
-        for (to, from) in rows.iter_mut().skip(brick.place[0] as usize).step_by(wide).zip(from) {
+        for (to, from) in rows.iter_mut().skip(brick.place()[0] as usize).step_by(wide).zip(from) {
             *to = *from;
         }
     }
@@ -145,8 +145,8 @@ impl Grid {
     /// Sends the bricks from that of the voxel `first` to `last`.
     fn send_row(&self, queue: &Queue, first: [u32; 3], last: Brick<'_>) {
         let [x, y, z] = first;
-        let [_, height, depth] = last.size;
-        let width = last.first()[0] + last.size[0] - x;
+        let [wide, height, depth] = last.size();
+        let width = last.first()[0] + wide - x;
         let layout = TexelCopyBufferLayout {
             offset: u64::from(x),
             bytes_per_row: Some(self.dims[0].next_multiple_of(BRICK_SIDE)),

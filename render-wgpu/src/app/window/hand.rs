@@ -23,18 +23,13 @@ pub(in crate::app) struct Aim<'a> {
 impl Aim<'_> {
     /// The place under the mouse at the depth of `anchor`.
     pub(super) fn at_depth_of(&self, anchor: Vec3) -> Vec3 {
-        self.painter.camera.unproject(self.point, self.aspect(), anchor)
+        self.painter.camera.unproject(self.point, self.painter.aspect(), anchor)
     }
 
     /// From where one looks, and the direction of what is under the mouse, of unit length.
     pub(super) fn ray(&self) -> (Vec3, Vec3) {
         let camera = &self.painter.camera;
-        (camera.eye(), camera.direction(self.point, self.aspect()))
-    }
-
-    fn aspect(&self) -> f32 {
-        let (width, height) = self.painter.size();
-        width as f32 / height as f32
+        (camera.eye(), camera.direction(self.point, self.painter.aspect()))
     }
 }
 

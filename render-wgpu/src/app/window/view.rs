@@ -205,8 +205,7 @@ impl<H: Hand> View<H> {
                         painter.camera.orbit(-TURN * by.x, TURN * by.y);
                     }
                     MouseButton::Middle => {
-                        let (width, height) = painter.size();
-                        let aspect = width as f32 / height as f32;
+                        let aspect = painter.aspect();
                         painter.camera.pan(Vec2::new(by.x, -by.y), aspect);
                     }
                     _ => {}

@@ -20,10 +20,8 @@ const CELL_SIDE: u32 = BRICK_SIDE / 2;
 /// A brick of a volume, as a renderer sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Brick<'a> {
-    /// Its place among the bricks.
-    pub place: [u32; 3],
-    /// Its voxels along each axis: [`BRICK_SIDE`], or fewer at the volume's far sides.
-    pub size: [u32; 3],
+    layout: Layout,
+    number: usize,
     /// That of its last change. No two changes of a process share one, so that of two bricks of the same
     /// revision at the same place, be it of one volume at two times or of two copies that went different ways, the
     /// densities are the same. It is never 0.
@@ -36,10 +34,23 @@ pub struct Brick<'a> {
 }
 
 impl Brick<'_> {
+    /// Its place among the bricks.
+    #[must_use]
+    pub fn place(&self) -> [u32; 3] {
+        self.layout.place(self.number)
+    }
+
     /// The volume's voxel that is the brick's first.
     #[must_use]
     pub fn first(&self) -> [u32; 3] {
-        self.place.map(|place| place * BRICK_SIDE)
+        self.place().map(|place| place * BRICK_SIDE)
+    }
+
+    /// Its voxels along each axis: [`BRICK_SIDE`], or fewer at the volume's far sides.
+    #[must_use]
+    pub fn size(&self) -> [u32; 3] {
+        let place = self.place();
+        std::array::from_fn(|axis| self.layout.span(place[axis], axis).len() as u32)
     }
 
     /// Whether all its voxels are empty.
@@ -222,11 +233,13 @@ impl Bricks {
 
     pub(super) fn iter(&self) -> impl Iterator<Item = Brick<'_>> {
         let bricks = self.headers.iter().zip(&self.voxels).enumerate();
-        bricks.map(|(brick, (&Header { revision, peak }, densities))| {
-            let place = self.layout.place(brick);
-            let span = |axis: usize| self.layout.span(place[axis], axis).len() as u32;
-            let size = std::array::from_fn(span);
-            Brick { place, size, revision, peak, densities }
+        // Whoever looks for those that changed asks where few of many are: that is found out then.
+        bricks.map(|(number, (&Header { revision, peak }, densities))| Brick {
+            layout: self.layout,
+            number,
+            revision,
+            peak,
+            densities,
         })
     }
 

@@ -47,7 +47,7 @@ type BrickState = ([u32; 3], [u32; 3], u8, Vec<u8>);
 
 fn bricks(volume: &Volume) -> Vec<BrickState> {
     let brick =
-        |brick: Brick<'_>| (brick.first(), brick.size, brick.peak, brick.densities.to_vec());
+        |brick: Brick<'_>| (brick.first(), brick.size(), brick.peak, brick.densities.to_vec());
     volume.bricks().map(brick).collect()
 }
 
@@ -231,7 +231,7 @@ fn a_sparse_volume_is_the_same_as_a_whole_one() {
     assert!(sparse.densities().eq(whole.densities()));
     assert_eq!(sparse.digest(), whole.digest());
     let bricks = |volume: &Volume| -> Vec<([u32; 3], u8)> {
-        volume.bricks().map(|brick| (brick.place, brick.peak)).collect()
+        volume.bricks().map(|brick| (brick.place(), brick.peak)).collect()
     };
     assert_eq!(bricks(&sparse), bricks(&whole));
     let nothing = Volume::sparse([0, 1, 1], spacing, Pose::IDENTITY, may_hold, density);

@@ -133,12 +133,12 @@ impl<'a> Bone<'a> {
             if !self.may_hold(brick.first(), BRICK_SIDE) {
                 continue;
             }
-            let first = brick.first();
+            let (first, size) = (brick.first(), brick.size());
             for (slot, &left) in brick.densities.iter().enumerate() {
                 let side = BRICK_SIDE as usize;
                 let within = [slot % side, slot / side % side, slot / (side * side)];
                 let within = within.map(|index| index as u32);
-                if (0..3).any(|axis| within[axis] >= brick.size[axis]) {
+                if (0..3).any(|axis| within[axis] >= size[axis]) {
                     continue;
                 }
                 let voxel = [0, 1, 2].map(|axis| first[axis] + within[axis]);
