@@ -120,8 +120,10 @@ fn executor_controls(ui: &mut Ui, controls: &mut Controls) {
         ui.end_row();
         ui.label("frames in flight");
         ui.add_enabled_ui(controls.executor == ExecutorKind::Pipeline, |ui| {
-            ui.selectable_value(&mut controls.frames_in_flight, 1, "1");
-            ui.selectable_value(&mut controls.frames_in_flight, 2, "2");
+            ui.horizontal(|ui| {
+                ui.selectable_value(&mut controls.frames_in_flight, 1, "1");
+                ui.selectable_value(&mut controls.frames_in_flight, 2, "2");
+            });
         });
         ui.end_row();
     });

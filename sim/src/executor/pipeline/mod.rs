@@ -76,7 +76,8 @@ impl PipelineExecutor {
     /// An executor of `scene` on the threads of `pool`, which may be resized at any time.
     ///
     /// # Errors
-    /// More objects than the grain allows, an object whose number is not its place, or threads that cannot be had.
+    /// More objects than the grain allows, numbers of objects that are not 0, 1, 2 … without gaps, or threads that
+    /// cannot be had.
     pub fn new(
         scene: Scene,
         grain: Grain,
