@@ -6,7 +6,7 @@ mod common;
 use std::any::Any;
 
 use common::no_rules;
-use dualframe_sim::behavior::drill::{Bit, Burr, Erode, Feed, Reaction};
+use dualframe_sim::behavior::drill::{Approach, Bit, Burr, Erode, Feed, Reaction};
 use dualframe_sim::behavior::piece::Piece;
 use dualframe_sim::behavior::{Behavior, Bone, Grasp, Hold, Input};
 use dualframe_sim::executor::ExecutorKind;
@@ -41,7 +41,7 @@ const FRAMES: u64 = 280;
 struct Drill {
     feed: Feed,
     bit: Bit,
-    side: Option<Vec3>,
+    approach: Approach,
     /// The direction in which it begins, and round which side it goes.
     first: f32,
     forces: f32,
@@ -51,7 +51,7 @@ impl Drill {
     fn new(first: f32) -> Self {
         let bit = Bit { length: 12e-3, radius: 1.5e-3, specific_energy: 2e7, ..Bit::BURR };
         let feed = Feed::new(20.0, 1_000.0, 5e-4, 4e-4).expect("a hand");
-        Self { feed, bit, side: None, first, forces: 0.0 }
+        Self { feed, bit, approach: Approach::default(), first, forces: 0.0 }
     }
 
     /// Where the hand wants it: down through the bone, and round.
@@ -67,7 +67,8 @@ impl Drill {
     }
 
     fn at(&self, center: Vec3) -> Burr {
-        Burr { bit: self.bit, center, axis: Vec3::Z, spin: 4e3, side: self.side }
+        let side = self.approach.side(center);
+        Burr { bit: self.bit, center, axis: Vec3::Z, spin: 4e3, side }
     }
 }
 
@@ -75,9 +76,9 @@ impl Behavior for Drill {
     fn update(&mut self, geometry: &mut Geometry, input: &mut Input<'_>) {
         let Geometry::Rigid(rigid) = geometry else { return };
         let reaction = Reaction::new(input.contacts(), input.time_step);
-        self.side = reaction.normal();
         self.forces += reaction.force.length();
         let place = rigid.pose.translation;
+        self.approach.follow(&self.at(place), reaction.normal());
         let load = self.feed.load(&reaction);
         if load > 0.0 {
             let erode = Erode { burr: self.at(place), load };

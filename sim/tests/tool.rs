@@ -281,12 +281,22 @@ fn forceps_hold_until_they_open_and_are_put_away() {
         }
         let lifted = height(&manager);
         assert!(lifted > 0.004, "lifted by {lifted} m");
+        let held = |manager: &VeManager| {
+            read(manager, TOOL, |tool| Tool::of(tool).expect("a tool").work().held.length())
+        };
+        assert!(held(&manager) > 0.1, "{} N", held(&manager));
         if opens {
             move_to(&manager, MIDDLE + Vec3::Z * 0.009, false);
         } else {
             take_up(&manager, Instrument::Burr);
         }
-        run(&mut manager, 240);
+        // Open forceps still held in the frame before; another instrument never did.
+        run(&mut manager, 1);
+        assert_eq!(held(&manager) > 0.0, opens);
+        for _ in 0..239 {
+            run(&mut manager, 1);
+            assert_eq!(held(&manager), 0.0);
+        }
         let left = height(&manager);
         assert!(left < 0.1 * lifted, "{left} m are left of {lifted} m");
     }

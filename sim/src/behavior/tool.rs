@@ -7,7 +7,7 @@ use glam::{Quat, Vec3};
 use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
-use super::drill::{Bit, Burr, Coupling, Erode, Feed, Perforator, Reaction};
+use super::drill::{Approach, Bit, Burr, Coupling, Erode, Feed, Perforator, Reaction};
 use super::instrument::EDGE;
 use super::{Behavior, Felt, Grasp, Hold, Input, Instrument, LetGo, tissue};
 use crate::device::DeviceSample;
@@ -102,6 +102,7 @@ pub struct Tool {
     perforator: Perforator,
     /// Of bone, in the frame before.
     reaction: Reaction,
+    approach: Approach,
     spin: f32,
     /// By what it works on, for the frame that comes.
     told: Felt,
@@ -135,6 +136,7 @@ impl Tool {
             feeds,
             perforator: Perforator::new(),
             reaction: Reaction::default(),
+            approach: Approach::default(),
             spin: 0.0,
             told: Felt::default(),
             work: Work::default(),
@@ -308,7 +310,13 @@ impl Tool {
             }
         }
         self.reaction = reaction;
+        match self.burr(geometry) {
+            Some(burr) => self.approach.follow(&burr, reaction.normal()),
+            None => self.approach = Approach::default(),
+        }
         let Felt { held, cuts } = std::mem::take(&mut self.told);
+        // What was let go of tells of it once more.
+        let held = if self.holds && !is_new { held } else { Vec3::ZERO };
         let cuts = cuts && self.instrument == Instrument::Scalpel && self.is_pressed();
         let turns = self.spin != 0.0;
         self.work = Work { bone: reaction.force, tissue, dura, held, cuts, turns };
@@ -359,7 +367,7 @@ impl Behavior for Tool {
         let bit = self.bit()?;
         let axis = axis(pose.rotation);
         let center = pose.translation + axis * bit.radius;
-        Some(Burr { bit, center, axis, spin: self.spin, side: self.reaction.normal() })
+        Some(Burr { bit, center, axis, spin: self.spin, side: self.approach.side(center) })
     }
 
     fn show_in(&self, snapshot: &mut Box<dyn Behavior>) {
@@ -378,9 +386,10 @@ impl Behavior for Tool {
             hasher.write(&value.to_le_bytes());
         }
         hasher.write_u8(u8::from(self.holds));
-        let Reaction { force, elastic, tip } = self.reaction;
+        let Reaction { force, elastic, tip, stiffness } = self.reaction;
         let edge = self.before.into_iter().flat_map(|blade| [blade.tip, blade.heel]);
-        for value in [force, elastic].into_iter().chain(edge).flat_map(|vector| vector.to_array()) {
+        let felt = [force, elastic, stiffness].into_iter().chain(edge).chain(self.approach.state());
+        for value in felt.flat_map(|vector| vector.to_array()) {
             hasher.write(&value.to_le_bytes());
         }
         hasher.write(&tip.to_le_bytes());

@@ -33,6 +33,13 @@ impl Bounds {
         (self.min.cmple(other.max) & other.min.cmple(self.max)).all()
     }
 
+    /// The smallest box that holds all of these points, in metres.
+    #[must_use]
+    pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
+        let point = |point| Self { min: point, max: point };
+        points.into_iter().map(point).fold(Self::EMPTY, |whole, point| whole.union(&point))
+    }
+
     /// The smallest box that holds both.
     #[must_use]
     pub fn union(&self, other: &Self) -> Self {

@@ -16,6 +16,9 @@ pub struct Link {
 /// Finds the links of two bodies that are not at their rest length. The pair's first object is the one
 /// that the first nodes of the links belong to.
 ///
+/// As any detection it is asked of bodies whose boxes overlap, contact spheres included: those that are pulled
+/// farther apart than that are not joined until they are nearer again.
+///
 /// A [`Touch`] is a link here: its normal points from the second node to the first, its depth is how much
 /// the link is too short, in metres, and negative for one that is too long. A node that one of the bodies
 /// does not have, and a link whose ends are in one place, are passed over.
@@ -27,7 +30,7 @@ pub struct Attached {
 }
 
 impl Attached {
-    /// Two bodies that these links join, however far they are apart.
+    /// Two bodies that these links join, however long they become.
     #[must_use]
     pub fn new(links: Vec<Link>) -> Self {
         Self { links, stretch: f32::INFINITY }

@@ -4,9 +4,10 @@ use glam::Vec3;
 
 use super::contact::Contact;
 use super::impulses::Impulses;
+use super::piece::free_piece;
 use super::touches::{Touch, Touches};
 use super::{Detection, Response};
-use crate::behavior::drill::{FRICTION, Overlap, Reaction};
+use crate::behavior::drill::{Bit, FRICTION, Overlap, Reaction};
 use crate::object::Object;
 
 /// Finds how deep a tool's bit is in bone. The pair's first object is the tool, the second a volume; a
@@ -43,7 +44,14 @@ impl Detection for BurrInBone {
 /// the axis, and none where the tip alone touches: there the surface turns on the spot.
 ///
 /// The tool is told the whole as the impulse on its body, and by the nodes of [`Reaction`] what of it is
-/// elastic and what its tip bears. The bone is told the opposite of the whole, on its centre of mass.
+/// elastic, how stiff that is, and what its tip bears. The bone is told the opposite of the whole, on its
+/// centre of mass.
+///
+/// A free piece ([`Piece`]) is told less. It weighs some grams, and a frame's impulse of a hand that presses the
+/// bit would move it by centimetres; what bears that in truth, a table or another hand, is not known here. So
+/// it yields as far as frees it of the bit, and the tool feels it as if it was held.
+///
+/// [`Piece`]: crate::behavior::piece::Piece
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BurrForce;
 
@@ -56,6 +64,7 @@ impl Response for BurrForce {
         [tool, bone]: [&mut Impulses; 2],
     ) {
         let Some(burr) = bodies[0].behavior.burr(&bodies[0].geometry) else { return };
+        let share = borne(bodies[1], &burr.bit, touches, time_step);
         for touch in touches.list() {
             let normal = Vec3::from_array(touch.normal);
             let force = burr.bit.elastic_force(touch.depth);
@@ -70,9 +79,21 @@ impl Response for BurrForce {
             let whole = elastic + drag;
             tool.add(Contact::BODY, whole.to_array());
             tool.add(Reaction::ELASTIC, elastic.to_array());
-            bone.add(Contact::BODY, (-whole).to_array());
+            let stiffness = normal * (burr.bit.elastic_stiffness(touch.depth) * time_step);
+            tool.add(Reaction::STIFFNESS, stiffness.to_array());
+            bone.add(Contact::BODY, (-whole * share).to_array());
         }
     }
+}
+
+/// The share of a bit's impulse that bone takes: all of it, or for a free piece one implicit step's, with twice the
+/// stiffness, since what an impulse does shows a frame later. So it goes at most a third of the depth in that
+/// frame, and all of it in the next ones.
+fn borne(bone: &Object, bit: &Bit, touches: &Touches, time_step: f32) -> f32 {
+    let Some((piece, _)) = free_piece(bone) else { return 1.0 };
+    let balls = touches.list().iter().filter(|touch| touch.nodes[0] == Contact::BODY);
+    let stiffness: f32 = balls.map(|touch| bit.elastic_stiffness(touch.depth)).sum();
+    1.0 / (1.0 + 2.0 * stiffness * time_step * time_step * piece.body().inverse_mass())
 }
 
 #[cfg(test)]
@@ -81,7 +102,7 @@ mod tests {
     use parry3d::shape::SharedShape;
 
     use super::*;
-    use crate::behavior::drill::{Bit, Burr};
+    use crate::behavior::drill::Burr;
     use crate::behavior::{Behavior, Bone, Fixed, Input};
     use crate::geometry::{Geometry, Rigid, Volume};
     use crate::interaction::{Member, Segment};

@@ -33,14 +33,15 @@ impl Detection for PieceInBone {
         let spin = piece.body().angular_velocity(own);
         for (number, &sample) in piece.samples().iter().enumerate() {
             let place = own.to_world(sample);
+            // A point that was drilled away stands for nothing any more.
+            if own.density_at(place) <= 0.25 {
+                continue;
+            }
             let way = (piece.body().velocity + spin.cross(place - center)) * self.time_step;
             let Some((gap, normal)) = way_to(bone, place, way) else { continue };
-            // A point that was drilled away stands for nothing any more.
-            if own.density_at(place) > 0.25 {
-                let depth = 0.5 * own.spacing().min_element() - gap;
-                let nodes = [number as u32, Contact::BODY];
-                touches.push(Touch { nodes, normal: normal.to_array(), depth });
-            }
+            let depth = 0.5 * own.spacing().min_element() - gap;
+            let nodes = [number as u32, Contact::BODY];
+            touches.push(Touch { nodes, normal: normal.to_array(), depth });
         }
     }
 }
@@ -71,7 +72,8 @@ const MOST_STEPS: u32 = 1_024;
 /// Halvings of the last step, for the surface; usually 5: to a sixtieth of a voxel.
 const HALVINGS: usize = 5;
 
-fn free_piece(object: &Object) -> Option<(&Piece, &Volume)> {
+/// A piece that is not in its place, and its volume.
+pub(super) fn free_piece(object: &Object) -> Option<(&Piece, &Volume)> {
     let behavior: &dyn Any = &*object.behavior;
     let piece = behavior.downcast_ref::<Piece>().filter(|piece| !piece.is_seated())?;
     Some((piece, object.geometry.as_volume()?))

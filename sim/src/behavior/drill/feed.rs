@@ -42,7 +42,8 @@ impl Coupling {
 /// A hand that pushes a tool towards a place as strongly as it can, by admittance: in contact it moves by
 /// the force that is left over, divided by a resistance. So there is no stiff loop, and a frame of 1/60 s
 /// will do: a bit settles without overshoot as long as the resistance, in N·s/m, is more than the time step
-/// times the stiffness of contact and hand.
+/// times the stiffness of contact and hand. Where these are stiffer, the resistance is that product: a step
+/// of Newton's method towards the place where the forces are equal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Feed {
     strength: f32,
@@ -107,7 +108,8 @@ impl Feed {
             return place + leave + across.clamp_length_max(self.contact_step);
         }
         let force = reaction.force - coupling.force(way);
-        let step = force * (time_step / self.resistance);
+        let stiffness = reaction.normal_stiffness() + coupling.stiffness;
+        let step = force * (time_step / self.resistance.max(stiffness * time_step));
         let back = step.dot(normal).max(0.0);
         let rest = (step - normal * back).clamp_length_max(self.contact_step);
         place + normal * back.min(self.free_step) + rest

@@ -10,6 +10,7 @@
 //! | [`Erode`], [`Erosions`] | what a bit takes away: a message, and what bone does with it |
 //! | [`Perforator`] | the clutch that stops where the bone ends |
 //! | [`Reaction`], [`Feed`] | what a tool feels, and how it goes on from there |
+//! | [`Approach`] | from which side it came |
 //! | [`Coupling`] | what the hand feels of it |
 //!
 //! A tool shows its bit by [`Behavior::burr`]; [`BurrInBone`] and [`BurrForce`] turn it into contacts, which
@@ -20,6 +21,7 @@
 //! [`BurrInBone`]: crate::interaction::BurrInBone
 //! [`BurrForce`]: crate::interaction::BurrForce
 
+mod approach;
 mod erosion;
 mod feed;
 mod overlap;
@@ -28,6 +30,7 @@ mod reaction;
 
 use glam::Vec3;
 
+pub use approach::{Approach, Side};
 pub use erosion::{Erode, Erosions};
 pub use feed::{Coupling, Feed, FeedError};
 pub use overlap::{Overlap, half_space_depth};
@@ -85,6 +88,13 @@ impl Bit {
         self.stiffness * self.radius * self.radius * share * share.sqrt()
     }
 
+    /// What that force grows by as the ball goes deeper, in newtons per metre.
+    #[must_use]
+    pub fn elastic_stiffness(&self, depth: f32) -> f32 {
+        let share = (depth / self.radius).max(0.0);
+        1.5 * self.stiffness * self.radius * share.sqrt()
+    }
+
     /// Its balls: one for every radius of length, and one.
     #[must_use]
     pub fn balls(&self) -> u32 {
@@ -105,10 +115,9 @@ pub struct Burr {
     /// How fast it turns about its axis, by the right-hand rule, in radians per second; 0 for one that
     /// stands still. Usually 105 (a perforator, 1,000 rpm) to 7,900 (75,000 rpm).
     pub spin: f32,
-    /// The outward normal of the bone that it touched in the frame before, of unit length:
-    /// [`Reaction::normal`]. A bit that is pressed into a thin wall beyond the wall's middle is still
-    /// pushed back to this side, and not out through the other.
-    pub side: Option<Vec3>,
+    /// The side of the bone that it is on: [`Approach::side`]. A bit that is pressed into a thin wall beyond the
+    /// wall's middle is still pushed back to this side, and not out through the other.
+    pub side: Option<Side>,
 }
 
 impl Burr {

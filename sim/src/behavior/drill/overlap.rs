@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_4, PI};
 
 use glam::{DVec3, Vec3};
 
-use super::Burr;
+use super::{Burr, Side};
 use crate::geometry::Volume;
 
 /// The least depth of a bit that has touched, in metres; usually 1 µm: 0.7 mN on a ball of 3 mm. So a
@@ -30,8 +30,8 @@ pub struct Overlap {
     pub tip_depth: f32,
     /// Where the bone pushes to: −M1/|M1|, of unit length; none where nothing touches.
     ///
-    /// Never to the side opposite to the bit's [`Burr::side`]: then to that side as before. |M1| goes through
-    /// 0 in the middle of a thin wall, so there the force has no step but a soft spot.
+    /// From inside never to the side opposite to the bit's [`Burr::side`]: then to that side as before. |M1| goes
+    /// through 0 in the middle of a thin wall, so there the force has no step but a soft spot.
     pub normal: Option<Vec3>,
 }
 
@@ -68,8 +68,10 @@ impl Overlap {
         };
         let depth = sums.depth(burr.bit.radius);
         let towards = towards.filter(|_| depth > 0.0).map(|out| volume.turned(out.as_vec3()));
-        let against = |side: &Vec3| towards.is_none_or(|towards| towards.dot(*side) < 0.0);
-        let normal = burr.side.filter(against).or(towards);
+        let against = |side: &Side| {
+            towards.is_none_or(|towards| side.is_inside && towards.dot(side.normal) < 0.0)
+        };
+        let normal = burr.side.filter(against).map(|side| side.normal).or(towards);
         Self {
             volume: (mass * unit) as f32,
             moment: volume.turned((moment * unit).as_vec3()),

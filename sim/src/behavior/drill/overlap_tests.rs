@@ -49,7 +49,7 @@ fn center(volume: &Volume, normal: Vec3, offset: f32, radius: f32, depth: f32, s
     volume.to_world(local)
 }
 
-fn burr(center: Vec3, radius: f32, side: Option<Vec3>) -> Burr {
+fn burr(center: Vec3, radius: f32, side: Option<Side>) -> Burr {
     let bit = Bit { radius, tip_radius: 0.5 * radius, ..Bit::BURR };
     Burr { bit, center, axis: Vec3::Z, spin: 0.0, side }
 }
@@ -172,7 +172,7 @@ fn a_thin_wall_pushes_back_to_the_side_that_the_bit_came_from() {
             let alone = Overlap::new(&volume, &burr(at, 3e-3, None), at);
             assert!(alone.normal.expect("likewise").z < -0.99);
         }
-        side = Some(normal);
+        side = Some(Side { normal, is_inside: true });
         let push = elastic_force(3e-3, overlap.depth) * normal.z;
         assert!(push > 0.0, "it still touches at {height} m");
         let step = before.map_or(0.0, |before: f32| (push - before).abs());
@@ -185,8 +185,9 @@ fn a_thin_wall_pushes_back_to_the_side_that_the_bit_came_from() {
 fn nothing_where_there_is_no_bone() {
     let volume = half_space(Vec3::Z, 0.0);
     let far = volume.to_world(volume.extent() * Vec3::new(0.5, 0.5, 0.9));
+    let side = Some(Side { normal: Vec3::X, is_inside: true });
     for center in [far, Vec3::NAN, Vec3::splat(9.0)] {
-        let overlap = Overlap::new(&volume, &burr(center, 3e-3, Some(Vec3::X)), center);
+        let overlap = Overlap::new(&volume, &burr(center, 3e-3, side), center);
         assert_eq!(overlap, Overlap::default());
     }
 }

@@ -13,6 +13,8 @@ pub struct Reaction {
     pub elastic: Vec3,
     /// The axial load on the bit's tip: that which the bone under the tip would bear alone.
     pub tip: f32,
+    /// What `elastic` grows by as the bit goes deeper, in newtons per metre, along the bone's outward normals.
+    pub stiffness: Vec3,
 }
 
 impl Reaction {
@@ -21,6 +23,9 @@ impl Reaction {
     pub const ELASTIC: u32 = 0;
     /// The node number of a contact that tells a tool the load on its tip, along its axis; likewise.
     pub const TIP: u32 = 1;
+    /// The node number of a contact that tells a tool how stiff bone is under it: what the elastic impulse
+    /// would grow by in a metre, as it goes in the first micrometres; likewise.
+    pub const STIFFNESS: u32 = 2;
 
     /// What a frame's contacts say of a rigid tool; `time_step` is the frame's, in seconds.
     #[must_use]
@@ -32,6 +37,7 @@ impl Reaction {
                 Contact::BODY => reaction.force += force,
                 Self::ELASTIC => reaction.elastic += force,
                 Self::TIP => reaction.tip += force.length(),
+                Self::STIFFNESS => reaction.stiffness += force,
                 _ => {}
             }
         }
@@ -48,5 +54,11 @@ impl Reaction {
     #[must_use]
     pub fn load(&self) -> f32 {
         self.elastic.length()
+    }
+
+    /// How stiff the bone is along its normal, in newtons per metre; 0 where nothing is touched.
+    #[must_use]
+    pub fn normal_stiffness(&self) -> f32 {
+        self.normal().map_or(0.0, |normal| self.stiffness.dot(normal).max(0.0))
     }
 }

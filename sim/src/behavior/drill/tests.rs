@@ -18,6 +18,7 @@ struct Bench {
     frame: u64,
     waiting: Option<Erode>,
     reaction: Reaction,
+    approach: Approach,
 }
 
 impl Bench {
@@ -34,6 +35,7 @@ impl Bench {
             frame: 0,
             waiting: None,
             reaction: Reaction::default(),
+            approach: Approach::default(),
         }
     }
 
@@ -45,6 +47,7 @@ impl Bench {
             let Some(normal) = overlap.normal else { continue };
             let force = self.burr.bit.elastic_force(overlap.depth);
             reaction.elastic += normal * force;
+            reaction.stiffness += normal * self.burr.bit.elastic_stiffness(overlap.depth);
             reaction.force += normal * force
                 + self.burr.axis.cross(normal) * (FRICTION * force * self.burr.spin.signum());
             reaction.tip += self.burr.bit.elastic_force(overlap.tip_depth);
@@ -59,9 +62,10 @@ impl Bench {
             self.erosions.add(erode);
         }
         let removed = self.erosions.apply(&mut self.volume, self.frame, TIME);
-        self.burr.side = self.reaction.normal();
+        self.approach.follow(&self.burr, self.reaction.normal());
         self.waiting = Some(Erode { burr: self.burr, load: self.feed.load(&self.reaction) });
         self.burr.center = self.feed.next(self.burr.center, intended, &self.reaction, TIME);
+        self.burr.side = self.approach.side(self.burr.center);
         self.frame += 1;
         removed
     }
@@ -139,6 +143,63 @@ fn a_constant_push_settles_without_oscillation() {
         assert!(steps[119].abs() < 1e-7, "{} m in the last frame", steps[119]);
         assert!((bench.reaction.elastic.z - push).abs() < 0.02 * push, "{:?}", bench.reaction);
         assert!((bench.tip() - SURFACE).truncate().length() < 1e-4, "{}", bench.tip());
+    }
+}
+
+/// A craniotome as a tool moves it, upright, its lowest ball at a place in bone.
+fn craniotome(volume: Volume, center: Vec3) -> Bench {
+    let tip = center - Vec3::Z * Bit::CRANIOTOME.radius;
+    let mut bench = Bench::new(volume, Bit::CRANIOTOME, tip, 0.0, 10.0);
+    let feed = Feed::new(10.0, Feed::RESISTANCE, Bit::CRANIOTOME.radius, 2.5e-4);
+    bench.feed = feed.expect("all are positive");
+    bench
+}
+
+/// Many of its balls press on an edge at once, from wherever they come.
+#[test]
+fn a_rod_settles_on_an_edge_without_oscillation() {
+    let edge = |[x, _, z]: [u32; 3]| if x >= 20 && (6..20).contains(&z) { 255 } else { 0 };
+    let bone = Volume::from_fn([40; 3], Vec3::splat(5e-4), Pose::IDENTITY, edge);
+    let bone = bone.expect("it is small");
+    for number in 0..24 {
+        let gap = Bit::CRANIOTOME.radius + 5e-5 * number as f32;
+        let mut bench = craniotome(bone.clone(), Vec3::new(0.01 - gap, 0.01, 2e-3));
+        for _ in 0..200 {
+            bench.step(Vec3::new(0.02, 0.01, 2e-3));
+        }
+        let before = bench.burr.center;
+        bench.step(Vec3::new(0.02, 0.01, 2e-3));
+        let moved = (bench.burr.center - before).length();
+        assert!(moved < 1e-6, "{moved} m in the last frame after {gap} m");
+        assert!((bench.reaction.load() - 10.0).abs() < 0.1, "{:?}", bench.reaction);
+    }
+}
+
+/// What a bit touches on the other side of a slot pushes it back, though it touched this side just before.
+#[test]
+fn the_other_wall_of_a_slot_is_no_way_through() {
+    let walls = |[x, _, _]: [u32; 3]| if (18..22).contains(&x) { 0 } else { 255 };
+    let bone = Volume::from_fn([40; 3], Vec3::splat(5e-4), Pose::IDENTITY, walls);
+    let bone = bone.expect("it is small");
+    for speed in [0.01, 0.02, 0.05, 1.0] {
+        let middle = Vec3::new(0.01, 0.01, 5e-3);
+        let mut bench = craniotome(bone.clone(), middle);
+        for _ in 0..60 {
+            bench.step(middle - Vec3::X * 4e-3);
+        }
+        let mut pressed = 0.0;
+        for frame in 0..200 {
+            let way = (-4e-3 + speed * TIME * frame as f32).min(4e-3);
+            bench.step(middle + Vec3::X * way);
+            let across = bench.burr.center.x - middle.x;
+            assert!(across < 1.2e-3, "{across} m across in frame {frame} at {speed} m/s");
+            if frame >= 180 {
+                assert!(across.abs() < 4e-4, "{across} m across in frame {frame}");
+                pressed += bench.reaction.elastic.x / 20.0;
+            }
+        }
+        // It trembles between walls that are nearer to each other than it is wide.
+        assert!((-20.0..-5.0).contains(&pressed), "{pressed} N on the other wall");
     }
 }
 

@@ -39,7 +39,8 @@ impl Body {
         body
     }
 
-    /// Takes mass and inertia from the densities as they are now; velocities stay, as long as there is bone.
+    /// Takes mass and inertia from the densities as they are now. What is left of it moves on as it did, as
+    /// long as there is bone: with what is taken away goes its momentum.
     pub(super) fn weigh(&mut self, volume: &Volume) {
         let sums = Sums::new(volume);
         let spacing = volume.spacing().as_dvec3();
@@ -67,7 +68,11 @@ impl Body {
             DVec3::new(-xy, trace - square.y, -yz),
             DVec3::new(-xz, -yz, trace - square.z),
         );
-        self.middle = ((mean + 0.5) * spacing).as_vec3();
+        let middle = ((mean + 0.5) * spacing).as_vec3();
+        let spin = self.angular_velocity(volume);
+        self.velocity += spin.cross(volume.turned(middle - self.middle));
+        self.angular_momentum = volume.turned(inertia.as_mat3() * volume.turned_back(spin));
+        self.middle = middle;
         self.inverse_inertia = inertia.inverse().as_mat3();
     }
 

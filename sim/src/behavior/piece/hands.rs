@@ -12,7 +12,9 @@ use crate::object::ObjectId;
 
 impl Holdable for Piece {
     fn take(&mut self, geometry: &Geometry, grasp: &Grasp) {
-        if let Some(hand) = geometry.as_volume().and_then(|volume| Hand::new(grasp, volume)) {
+        let Some(volume) = geometry.as_volume().filter(|_| is_valid(grasp)) else { return };
+        self.let_go(grasp.by);
+        if let Some(hand) = Hand::new(grasp, volume) {
             self.hands.take(hand);
         }
     }
@@ -44,14 +46,20 @@ struct Hand {
     strength: f32,
 }
 
+/// Whether a grasp says what a piece can be held by.
+fn is_valid(grasp: &Grasp) -> bool {
+    let positive = |value: f32| value > 0.0 && value.is_finite();
+    grasp.point.is_finite()
+        && [grasp.radius, grasp.stiffness, grasp.strength].into_iter().all(positive)
+}
+
 impl Hand {
+    /// A hold of bone, if there is some.
     fn new(grasp: &Grasp, volume: &Volume) -> Option<Self> {
         let Grasp { by, point: target, radius, stiffness, strength } = *grasp;
-        let positive = |value: f32| value > 0.0 && value.is_finite();
         let mut there = false;
         volume.visit(target, radius, |voxel| there |= voxel.density >= 128);
-        let valid = there && positive(stiffness) && positive(strength);
-        valid.then(|| Self { by, grip: volume.to_local(target), target, stiffness, strength })
+        there.then(|| Self { by, grip: volume.to_local(target), target, stiffness, strength })
     }
 
     /// The way from the point held to its place, in metres.
@@ -87,10 +95,8 @@ impl Hand {
 
 impl Hands {
     fn take(&mut self, hand: Hand) {
-        match self.0.binary_search_by_key(&hand.by, |hand| hand.by) {
-            Ok(place) => self.0[place] = hand,
-            Err(place) => self.0.insert(place, hand),
-        }
+        let place = self.0.partition_point(|other| other.by < hand.by);
+        self.0.insert(place, hand);
     }
 
     /// The tools, in ascending order.

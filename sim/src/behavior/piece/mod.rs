@@ -35,9 +35,9 @@ const DAMPING: [f32; 2] = [0.05, 1.0];
 /// It lies still in the place where it was made until tools pull at it with more than 3 N; let go of within
 /// 2 mm and 10° of there, it lies there again.
 ///
-/// A frame moves it by the velocity that contacts have left, and then adds what gravity and the tools
-/// that hold it will do in the next one. So what contacts of the next frame see is where it is about to go:
-/// they stop it before it is there, and on bone it rests without sinking in.
+/// A frame moves it by the velocity that contacts with other bone have left, and then adds what gravity, bits
+/// that press on it and the tools that hold it will do in the next one. So what contacts of the next frame see is
+/// where it is about to go: they stop it before it is there, and on bone it rests without sinking in.
 #[derive(Clone, Debug)]
 pub struct Piece {
     body: Body,
@@ -113,14 +113,12 @@ impl Piece {
         &self.samples
     }
 
-    /// What a frame's contacts did to it.
+    /// What a frame's contact with bone did to it; those of its whole body are others.
     fn receive(&mut self, contact: Contact, volume: &Volume) {
-        let at = match self.samples.get(contact.node as usize) {
-            Some(&sample) => volume.turned(sample - self.body.middle),
-            None if contact.node == Contact::BODY => Vec3::ZERO,
-            None => return,
-        };
-        self.body.push(Vec3::from_array(contact.impulse), at);
+        if let Some(&sample) = self.samples.get(contact.node as usize) {
+            let at = volume.turned(sample - self.body.middle);
+            self.body.push(Vec3::from_array(contact.impulse), at);
+        }
     }
 
     /// The pose to go back to, if it was let go of near enough to its place.
@@ -165,6 +163,10 @@ impl Behavior for Piece {
             let [along, around] = DAMPING.map(|rate| 1.0 / (1.0 + rate * time));
             self.body.velocity = self.body.velocity * along + input.gravity * time;
             self.body.angular_momentum *= around;
+            let whole = input.contacts().filter(|contact| contact.node == Contact::BODY);
+            for contact in whole {
+                self.body.push(Vec3::from_array(contact.impulse), Vec3::ZERO);
+            }
             self.hands.pull(&mut self.body, volume, time);
         }
         for (by, held) in self.hands.felt(volume) {

@@ -18,7 +18,9 @@ use self::kernel::{Advance, Nodes, ToCenter};
 use self::material::check;
 use self::springs::Springs;
 use super::{Behavior, Felt, Input};
-use crate::geometry::{CutNode, CutSurface, Geometry, Mesh, Sweep, Topology, Vectors, edges};
+use crate::geometry::{
+    Bounds, CutNode, CutSurface, Geometry, Mesh, Sweep, Topology, Vectors, edges,
+};
 use crate::message::Message;
 use crate::object::{Object, ObjectId};
 
@@ -213,7 +215,9 @@ impl Tissue {
 
     /// Cuts where a tool's blade has been. A cut that cannot be is not made.
     fn cut(&mut self, mesh: &mut Mesh, by: ObjectId, sweep: Sweep) {
-        if !self.fits(mesh) {
+        // A pressed blade tells all tissue there is, most of which is far from it.
+        let is_near = || Bounds::around(mesh.positions.iter()).overlaps(&sweep.bounds());
+        if !self.fits(mesh) || !(self.cut_front(by).is_some() || is_near()) {
             return;
         }
         if let Some(front) = self.fronts.iter_mut().find(|front| front.by == by) {

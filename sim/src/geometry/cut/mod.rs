@@ -38,6 +38,8 @@ mod tests;
 
 use glam::Vec3;
 
+use super::Bounds;
+
 pub(crate) use surface::{Birth, CutSurface, Node as CutNode};
 
 /// How near an end of an edge, as a share of its length, a crossing is moved to that end; usually 0.1.
@@ -73,4 +75,13 @@ impl Blade {
 pub(crate) struct Sweep {
     pub(crate) before: Blade,
     pub(crate) now: Blade,
+}
+
+impl Sweep {
+    /// The box around all that the blade has passed.
+    pub(crate) fn bounds(&self) -> Bounds {
+        Bounds::around(
+            [self.before, self.now].into_iter().flat_map(|blade| [blade.tip, blade.heel]),
+        )
+    }
 }

@@ -258,13 +258,10 @@ impl Volume {
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         let extent = self.extent();
-        let corners = (0..8).map(|corner| {
+        Bounds::around((0..8).map(|corner| {
             let side = |axis: usize| (corner >> axis & 1) as f32 * extent[axis];
             self.to_world(Vec3::new(side(0), side(1), side(2)))
-        });
-        corners.fold(Bounds::EMPTY, |bounds, corner| {
-            bounds.union(&Bounds { min: corner, max: corner })
-        })
+        }))
     }
 
     /// Whether pose, velocity and margin are finite.

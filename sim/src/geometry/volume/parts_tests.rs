@@ -132,6 +132,19 @@ fn the_rim_goes_to_the_nearer_part() {
     assert_eq!(mass(&piece), 2_592 * 255 + 6 * 40 + 2 * 200);
 }
 
+/// The border of the box that was searched is where a part ends, though its bone goes on.
+#[test]
+fn a_part_that_a_search_cut_off() {
+    for xs in [5..15, 0..10] {
+        let mut volume = build([64; 3], |_| 255);
+        let before = mass(&volume);
+        let parts = volume.parts([xs, 0..64, 0..64]);
+        let piece = volume.split_off(&parts[0]).expect("its own part");
+        assert_eq!(mass(&piece), 10 * 64 * 64 * 255);
+        assert_eq!(mass(&piece) + mass(&volume), before);
+    }
+}
+
 /// Two passes over the runs find what a flood finds.
 #[test]
 fn the_same_parts_as_a_flood() {
@@ -167,6 +180,9 @@ fn the_same_parts_as_a_flood() {
             let before = mass(&volume);
             let piece = volume.split_off(part).expect("its own part");
             assert_eq!(mass(&piece) + mass(&volume), before, "seed {seed}");
+            // Chips may have gone with it.
+            let solid = piece.densities().filter(|&density| density >= SOLID).count() as u64;
+            assert!(solid >= part.voxels(), "seed {seed}: {solid} of {}", part.voxels());
         }
     }
 }

@@ -84,9 +84,8 @@ impl Claim {
         claim.copy(volume);
         claim.mark(part, Owner::Part);
         for other in volume.parts(claim.region.clone()) {
-            let run = &other.runs()[0];
-            let same = claim.owner([run.xs.start, run.y, run.z]) == Owner::Part;
-            if !same && (other.touches_border() || other.voxels() >= CHIP) {
+            // The part itself, or what it was cut off from by the border of the box that was searched.
+            if other.touches_border() || other.voxels() >= CHIP {
                 claim.mark(&other, Owner::Rest);
             }
         }
@@ -122,12 +121,16 @@ impl Claim {
         }
     }
 
+    /// Gives it what of a part nobody owns yet.
     fn mark(&mut self, part: &Part, owner: Owner) {
         for run in part.runs() {
             let first = self.cell([run.xs.start, run.y, run.z]);
-            let cells = first..first + run.xs.len();
-            self.owners[cells.clone()].fill(owner);
-            self.owned.extend(cells.map(|cell| cell as u32));
+            for cell in first..first + run.xs.len() {
+                if self.owners[cell] == Owner::Nobody {
+                    self.owners[cell] = owner;
+                    self.owned.push(cell as u32);
+                }
+            }
         }
     }
 

@@ -77,9 +77,7 @@ fn push_cut(skull: &Volume, (from, to): (&Entry, &Entry), reach: f32, voxels: &m
     let depths = -BEYOND..=from.thickness.max(to.thickness) + BEYOND;
     let ends =
         [from, to].map(|end| [*depths.start(), *depths.end()].map(|z| end.point + end.inward * z));
-    let bounds = ends.as_flattened().iter();
-    let bounds =
-        bounds.fold(Bounds::EMPTY, |bounds, &end| bounds.union(&Bounds { min: end, max: end }));
+    let bounds = Bounds::around(ends.into_iter().flatten());
     let [xs, ys, zs] = freeing::voxels(skull, &bounds.inflated(reach));
     // In the skull's own axes.
     let inward = skull.turned_back((from.inward + to.inward).normalize_or(from.inward));

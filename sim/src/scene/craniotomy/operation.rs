@@ -213,7 +213,5 @@ fn region(head: &Head) -> Bounds {
         .craniotomy
         .iter()
         .flat_map(|&Entry { point, inward, thickness }| [point, point + inward * thickness]);
-    let around = places
-        .fold(Bounds::EMPTY, |bounds, place| bounds.union(&Bounds { min: place, max: place }));
-    around.inflated(MARGIN)
+    Bounds::around(places).inflated(MARGIN)
 }

@@ -57,7 +57,7 @@ impl Scale {
             let [right, front, up] = parts(point);
             place(right, front, up.max(floor))
         });
-        points.fold(Bounds::EMPTY, |bounds, point| bounds.union(&Bounds { min: point, max: point }))
+        Bounds::around(points)
     }
 }
 
