@@ -94,7 +94,7 @@ impl VeManager {
         Ok(Self { executor, pool, settings, running: false })
     }
 
-    /// Advances by `frames` frames; see [`Executor::advance`].
+    /// Advances by `frames` frames; see [`Executor::advance`]. A run of none does nothing: what was posted waits on.
     ///
     /// # Errors
     /// Those of [`Executor::advance`]; [`ExecutorError::BrokenOff`] after a run that panicked.
@@ -109,6 +109,11 @@ impl VeManager {
     ) -> Result<(), ExecutorError> {
         if self.running {
             return Err(ExecutorError::BrokenOff);
+        }
+        if frames == 0 {
+            // An executor would take messages for a frame that is still to come, and a recorder that begins
+            // before that frame would not see them.
+            return Ok(());
         }
         self.running = true;
         let done = self.executor.advance(frames, renderer, on_frame);

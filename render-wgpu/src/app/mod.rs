@@ -99,7 +99,7 @@ fn operate(args: &CraniotomyArgs, allocations: AllocationCounter<'_>) -> ExitCod
         Ok(outputs) => outputs,
         Err(line) => return fail(&line, BAD_ARGUMENT),
     };
-    let patient = match Patient::new(args.ct.as_deref()) {
+    let patient = match Patient::new(input, outputs.record.is_some()) {
         Ok(patient) => patient,
         Err(error) => return fail(&with_causes(&error), BAD_ARGUMENT),
     };

@@ -61,6 +61,7 @@ pub(super) struct ReplayReport {
     pub(super) frames: u64,
     /// Those that agreed.
     checkpoints: u64,
+    /// From outside, of these frames.
     messages: u64,
     seconds: f64,
     fps: f64,
@@ -181,7 +182,7 @@ fn report(
         frames_in_flight: args.way.frames_in_flight,
         frames,
         checkpoints: replay.checkpoints(),
-        messages: replay.totals().letters,
+        messages: replay.letters(),
         seconds,
         fps: frames as f64 / seconds.max(f64::MIN_POSITIVE),
         state_hash: hex(manager.state_hash()),

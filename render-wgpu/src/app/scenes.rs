@@ -1,7 +1,7 @@
 //! The scenes that the program knows, and that a recording can be of.
 
 use std::hash::Hasher;
-use std::path::Path;
+use std::path::{self, Path};
 use std::sync::Arc;
 
 use dualframe_sim::blocking::Grain;
@@ -127,13 +127,18 @@ pub(super) enum PatientError {
         #[source]
         source: HeadError,
     },
+    #[error(
+        "{file} cannot be recorded: its whole path must be UTF-8 of at most {MOST_OF_A_PATH} bytes"
+    )]
+    Name { file: String },
     #[error("{file} is not the image that the session was recorded with")]
     Other { file: String },
 }
 
 impl Patient {
-    /// The one whose computed tomography this is; without one, the synthetic one.
-    pub(super) fn new(ct: Option<&Path>) -> Result<Self, PatientError> {
+    /// The one whose computed tomography this is; without one, the synthetic one. If it `is_recorded`, a
+    /// recording can say where the file is.
+    pub(super) fn new(ct: Option<&Path>, is_recorded: bool) -> Result<Self, PatientError> {
         let named = |file: &str, made: Result<Head, HeadError>| match made {
             Ok(head) => Ok(Arc::new(head)),
             Err(source) => Err(PatientError::Head { file: file.to_owned(), source }),
@@ -143,16 +148,20 @@ impl Patient {
             return Ok(Self { head, spec: PatientSpec { ct: None } });
         };
         let file = path.to_string_lossy().into_owned();
+        let place = match place(path) {
+            Err(_) if !is_recorded => file.clone(),
+            place => place?,
+        };
         let image = Image::open(path).map_err(PatientError::File)?;
         let digest = digest(&image);
         let head = named(&file, Head::from_ct(image, &Thresholds::default()))?;
-        Ok(Self { head, spec: PatientSpec { ct: Some((file, digest)) } })
+        Ok(Self { head, spec: PatientSpec { ct: Some((place, digest)) } })
     }
 
     /// The one that a session was recorded with.
     fn of(spec: &PatientSpec) -> Result<Self, PatientError> {
-        let Some((file, digest)) = &spec.ct else { return Self::new(None) };
-        let patient = Self::new(Some(Path::new(file)))?;
+        let Some((file, digest)) = &spec.ct else { return Self::new(None, false) };
+        let patient = Self::new(Some(Path::new(file)), false)?;
         let same = patient.spec.ct.as_ref().is_some_and(|(_, found)| found == digest);
         if same { Ok(patient) } else { Err(PatientError::Other { file: file.clone() }) }
     }
@@ -167,6 +176,14 @@ impl Patient {
     pub(super) fn spec(&self) -> &PatientSpec {
         &self.spec
     }
+}
+
+/// Where a file is, as a recording says it, which may be replayed from another folder.
+fn place(path: &Path) -> Result<String, PatientError> {
+    let absolute = path::absolute(path).ok();
+    let place = absolute.and_then(|absolute| absolute.into_os_string().into_string().ok());
+    let place = place.filter(|place| place.len() <= MOST_OF_A_PATH);
+    place.ok_or_else(|| PatientError::Name { file: path.to_string_lossy().into_owned() })
 }
 
 /// A hash (FNV-1a, 64 bits) of an image's sides, of where it lies and of its voxels.

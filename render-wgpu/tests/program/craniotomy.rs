@@ -1,9 +1,10 @@
 //! `dualframe craniotomy`: what it reports, what it refuses, and that what it records comes back.
 
+use std::ffi::OsStr;
 use std::fs;
 
-use crate::command::{read_json, run, told};
-use dualframe_sim::image::Image;
+use crate::command::{command, read_json, run, told};
+use dualframe_sim::image::{Image, save};
 use dualframe_sim::scene::head::synthetic_ct;
 
 #[test]
@@ -29,6 +30,32 @@ fn an_operation_is_reported_recorded_and_saved() {
         let output = run(&[&["replay", &record, "--json", &json], &way[..]].concat());
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         assert_eq!(read_json(json.as_ref())["state_hash"], report["state_hash"], "{way:?}");
+    }
+}
+
+/// Recorded in the image's folder, by its name there, and replayed in another.
+#[test]
+fn a_recording_finds_its_image() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let ct = synthetic_ct().expect("it has no file");
+    save(&folder.path().join("ct.nii.gz"), ct.grid(), ct.voxels()).expect("it can be written");
+    let record = ["craniotomy", "--headless", "--frames", "1", "--record", "session"];
+    let recorded = |ct: &OsStr| {
+        let mut command = command(&record);
+        command.arg("--ct").arg(ct).current_dir(folder.path()).output().expect("it starts")
+    };
+    let output = recorded("ct.nii.gz".as_ref());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let session = folder.path().join("session");
+    let output = run(&["replay", session.to_str().expect("a plain path")]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    #[cfg(unix)]
+    {
+        use std::os::unix::ffi::OsStrExt;
+
+        let before = fs::read(&session).expect("it was written");
+        told(&recorded(OsStr::from_bytes(b"ct\xff.nii.gz")), 2, "cannot be recorded");
+        assert!(fs::read(&session).expect("it is there") == before, "it was recorded over");
     }
 }
 

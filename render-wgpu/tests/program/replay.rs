@@ -4,7 +4,10 @@ use std::fs;
 use std::path::Path;
 
 use crate::command::{read_json, report, run, told};
+use dualframe_sim::executor::FrameRecord;
 use dualframe_sim::manager::{Settings, VeManager};
+use dualframe_sim::message::Message;
+use dualframe_sim::object::ObjectId;
 use dualframe_sim::record::wire::{Decoder, Encoder, Malformed};
 use dualframe_sim::record::{Header, Recorder, SceneSpec};
 use dualframe_sim::render::NullRenderer;
@@ -97,13 +100,19 @@ fn what_is_whole_of_a_cut_file_plays() {
     told(&run(&args), 2, "it is no recording");
 }
 
-/// Records 70 frames of a scene under the name of another.
+/// Records 70 frames of a scene, with a message in frame 61, under the name of another.
 fn record_as(file: &Path, scene: ParticleScene, name: &impl SceneSpec) {
     let scene = scene.build().expect("a valid scene");
     let mut manager = VeManager::new(scene, Settings::default()).expect("valid settings");
     let file = fs::File::create(file).expect("it can be written");
     let mut recorder = Recorder::begin(file, &Header::of(name), &manager).expect("it is a start");
-    recorder.run(&mut manager, 70, &mut NullRenderer::new(), &mut |_| {}).expect("it runs");
+    let mailbox = manager.mailbox();
+    let mut on_frame = |record: &FrameRecord| {
+        if record.frame == 59 {
+            mailbox.post(ObjectId(0), Message::Release);
+        }
+    };
+    recorder.run(&mut manager, 70, &mut NullRenderer::new(), &mut on_frame).expect("it runs");
     recorder.finish(&manager).expect("it is written");
 }
 
@@ -119,7 +128,9 @@ fn another_session_is_told_by_its_objects() {
     told(&output, 1, "after 60 frames the state is ");
     told(&output, 1, ": object 0 is ");
     told(&output, 1, ", and 4 more differ");
-    let difference = &read_json(&json)["difference"];
+    let replayed = read_json(&json);
+    assert_eq!((&replayed["frames"], &replayed["messages"]), (&60.into(), &0.into()));
+    let difference = &replayed["difference"];
     assert_eq!(difference["frame"], 60);
     assert_eq!(difference["objects"].as_array().map(Vec::len), Some(5));
     assert_ne!(difference["expected"], difference["found"]);
@@ -180,12 +191,15 @@ fn what_cannot_be_played() {
     record_as(&file, ParticleScene::new(1), &ParticleScene::new(0));
     told(&run(&["replay", text]), 2, "its scene cannot be built: 0 particles were asked for");
     record_as(&file, ParticleScene::new(1), &ParticleScene::new(1));
+    let output = run(&["replay", text]);
+    assert!(
+        output.status.success() && String::from_utf8_lossy(&output.stdout).contains("1 messages")
+    );
     told(&run(&["replay", text, "--json", "/no/such/folder/replay.json"]), 2, "/no/such/folder");
     told(&run(&["replay", text, "--threads", "0"]), 2, "--threads");
     told(&run(&["replay"]), 2, "<FILE>");
     // A name of two lines that clears the terminal is told in one that does not.
     told(&run(&["replay", "no\nsuch\u{1b}[2J"]), 2, "no\\nsuch\\u{1b}[2J");
-    assert!(run(&["replay", text]).status.success());
     told(&run(&["--headless", "--record", "/no/such/folder/session"]), 2, "/no/such/folder");
     // Nothing can be written there.
     if Path::new("/dev/full").exists() {

@@ -43,7 +43,7 @@ pub enum ImageError {
     Truncated {
         /// What it ends in.
         part: &'static str,
-        /// The part's length, in bytes.
+        /// The part's length, in bytes; the least that it can be where nothing says how long it is.
         needed: u64,
     },
     /// It goes on after the last voxel.
@@ -106,7 +106,7 @@ pub enum ImageError {
     /// The system has not enough memory.
     #[error("{bytes} bytes of memory are not to be had")]
     Memory {
-        /// What the voxels take, in bytes.
+        /// What was asked for, in bytes.
         bytes: u64,
     },
     /// A number of the affine map is not finite, or its origin is too far away.

@@ -4,7 +4,6 @@ use std::array;
 use std::ops::RangeInclusive;
 
 use glam::{DAffine3, DMat3, DVec3};
-use parry3d::math::{Pose, Rotation};
 
 use super::error::ImageError;
 
@@ -107,19 +106,6 @@ impl Grid {
     #[must_use]
     pub fn spacing(&self) -> DVec3 {
         columns(self.affine().matrix3).map(DVec3::length).into()
-    }
-
-    /// Where a body of these voxels is in the patient, its own origin being the first voxel's outer
-    /// corner: that corner, and the turn that brings its z axis onto that of the image and its x axis as
-    /// near as can be.
-    #[must_use]
-    pub fn pose(&self) -> Pose {
-        let affine = self.affine();
-        let corner = affine.transform_point3(DVec3::splat(-0.5)).as_vec3();
-        let [x, _, z] = columns(affine.matrix3).map(DVec3::normalize);
-        let y = z.cross(x).normalize();
-        let turn = DMat3::from_cols(y.cross(z), y, z);
-        Pose::from_parts(corner, Rotation::from_mat3(&turn.as_mat3()))
     }
 
     /// The file's voxels along its own axes.

@@ -30,7 +30,7 @@ pub use hounsfield::{AIR, ThresholdError, Thresholds};
 pub use nifti::{Voxel, save, write};
 
 use samples::Samples;
-use stream::Stream;
+use stream::{Part, Stream};
 
 use crate::fill::fill;
 
@@ -90,14 +90,13 @@ impl Image {
     fn decode(grid: Grid, samples: &Samples, stream: &mut Stream<'_>) -> Result<Self, ImageError> {
         let bytes = samples.bytes();
         let count = grid.voxels();
-        stream.promise(count as u64 * bytes as u64)?;
-        let mut voxels = Vec::new();
-        let memory = |_| ImageError::Memory { bytes: 2 * count as u64 };
-        voxels.try_reserve_exact(count).map_err(memory)?;
+        let part = Part { name: "voxels", bytes: count as u64 * bytes as u64 };
+        stream.promise(part)?;
+        let mut voxels = room(count)?;
         voxels.resize(count, AIR);
         let mut stored = vec![0; grid.stored_dims()[0] as usize * bytes];
         for row in grid.stored_rows() {
-            stream.read(&mut stored, "voxels")?;
+            stream.read(&mut stored, part)?;
             let mut places = row.places();
             samples.decode(&stored, |hounsfield| {
                 if let Some(place) = places.next() {
@@ -132,12 +131,18 @@ impl Image {
         if most < least {
             return Err(ImageError::NoBone { most, least });
         }
-        let mut densities = Vec::new();
-        let memory = |_| ImageError::Memory { bytes: self.voxels.len() as u64 };
-        densities.try_reserve_exact(self.voxels.len()).map_err(memory)?;
+        let mut densities = room(self.voxels.len())?;
         densities.extend(self.voxels.iter().map(|&hounsfield| thresholds.density(hounsfield)));
         Ok(densities)
     }
+}
+
+/// Room for so many values: a file says how many, and there may be no memory for them.
+pub(crate) fn room<T>(count: usize) -> Result<Vec<T>, ImageError> {
+    let mut room = Vec::new();
+    let memory = |_| ImageError::Memory { bytes: count as u64 * size_of::<T>() as u64 };
+    room.try_reserve_exact(count).map_err(memory)?;
+    Ok(room)
 }
 
 fn check_is_file(metadata: &Metadata) -> Result<(), ImageError> {

@@ -15,6 +15,20 @@ pub(super) struct Stream<'a> {
     packed: bool,
 }
 
+/// A part of a file, which may be read in pieces.
+#[derive(Clone, Copy)]
+pub(super) struct Part {
+    pub(super) name: &'static str,
+    /// Its length, in bytes.
+    pub(super) bytes: u64,
+}
+
+impl Part {
+    fn cut_off(self) -> ImageError {
+        ImageError::Truncated { part: self.name, needed: self.bytes }
+    }
+}
+
 /// The most bytes that one of gzip's can hold: the longest repetition, of 258 bytes, takes two bits
 /// (RFC 1951, section 3.2.5).
 const MOST_PER_BYTE: u64 = 1032;
@@ -31,33 +45,33 @@ impl<'a> Stream<'a> {
         Self { source, left: length.saturating_mul(MOST_PER_BYTE), packed: true }
     }
 
-    /// Checks that `bytes` of voxels can be all that is left.
-    pub(super) fn promise(&self, bytes: u64) -> Result<(), ImageError> {
-        match (self.packed, bytes <= self.left) {
-            (true, false) => Err(ImageError::Promise { promised: bytes, most: self.left }),
-            (false, false) => Err(ImageError::Truncated { part: "voxels", needed: bytes }),
-            (false, true) if bytes < self.left => Err(ImageError::Trailing),
+    /// Checks that a part can be all that is left.
+    pub(super) fn promise(&self, part: Part) -> Result<(), ImageError> {
+        match (self.packed, part.bytes <= self.left) {
+            (true, false) => Err(ImageError::Promise { promised: part.bytes, most: self.left }),
+            (false, false) => Err(part.cut_off()),
+            (false, true) if part.bytes < self.left => Err(ImageError::Trailing),
             _ => Ok(()),
         }
     }
 
-    /// Fills `bytes`, or says that `part` is cut off.
-    pub(super) fn read(&mut self, bytes: &mut [u8], part: &'static str) -> Result<(), ImageError> {
+    /// Fills `bytes`, or says that the part they belong to is cut off.
+    pub(super) fn read(&mut self, bytes: &mut [u8], part: Part) -> Result<(), ImageError> {
         let found = fill(&mut self.source, bytes).map_err(|error| self.fault(error))?;
         self.left = self.left.saturating_sub(found as u64);
         if found < bytes.len() {
-            return Err(ImageError::Truncated { part, needed: bytes.len() as u64 });
+            return Err(part.cut_off());
         }
         Ok(())
     }
 
-    /// Passes over `count` bytes of `part`.
-    pub(super) fn skip(&mut self, count: u64, part: &'static str) -> Result<(), ImageError> {
+    /// Passes over `count` bytes of a part.
+    pub(super) fn skip(&mut self, count: u64, part: Part) -> Result<(), ImageError> {
         let skipped = io::copy(&mut self.source.by_ref().take(count), &mut io::sink());
         let skipped = skipped.map_err(|error| self.fault(error))?;
         self.left = self.left.saturating_sub(skipped);
         if skipped < count {
-            return Err(ImageError::Truncated { part, needed: count });
+            return Err(part.cut_off());
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::io::Read;
 
 use super::MAX_LETTERS;
-use super::event::{Event, Stop, Totals};
+use super::event::{Event, Stop};
 use super::flaw::{Difference, ObjectDifference, ReadError, ReplayError};
 use super::header::Header;
 use super::reader::Reader;
@@ -36,6 +36,10 @@ pub struct Replay<R> {
     /// The next frame.
     frame: u64,
     state: State,
+    /// Messages of the frames that are done.
+    played: u64,
+    /// Those that were posted for the next frame and for the one after it.
+    posted: [u64; 2],
     checkpoints: u64,
     hashes: Vec<(ObjectId, u64)>,
 }
@@ -79,6 +83,8 @@ impl<R: Read> Replay<R> {
             stop_bytes: 0,
             frame: 0,
             state: State::More,
+            played: 0,
+            posted: [0; 2],
             checkpoints: 0,
             hashes: Vec::new(),
         })
@@ -90,10 +96,10 @@ impl<R: Read> Replay<R> {
         self.reader.header()
     }
 
-    /// How much of the recording was read so far, which is more than was played.
+    /// Messages from outside that were played: those processed in frames that are done.
     #[must_use]
-    pub fn totals(&self) -> Totals {
-        self.reader.totals()
+    pub fn letters(&self) -> u64 {
+        self.played
     }
 
     /// Checkpoints that agreed.
@@ -108,6 +114,7 @@ impl<R: Read> Replay<R> {
         self.read_ahead(1, 1);
         while let Some((due, to, message)) = self.letters.pop_front_if(|(due, ..)| *due < 2) {
             scene.mail.push(Letter { due, to, from: ObjectId::HOST, message });
+            self.posted[due as usize] += 1;
         }
     }
 
@@ -158,11 +165,15 @@ impl<R: Read> Replay<R> {
         on_frame: &mut OnFrame<'_>,
     ) -> Result<(), ReplayError> {
         let (mailbox, letters) = (manager.mailbox(), &mut self.letters);
+        let (played, posted) = (&mut self.played, &mut self.posted);
         manager.run(frames, renderer, &mut |record| {
             on_frame(record);
             let due = record.frame + 2;
+            *played += posted[0];
+            *posted = [posted[1], 0];
             while let Some((_, to, message)) = letters.pop_front_if(|(next, ..)| *next <= due) {
                 mailbox.post(to, message);
+                posted[1] += 1;
             }
         })?;
         self.frame += frames;

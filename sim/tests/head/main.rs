@@ -3,6 +3,8 @@
 #![forbid(unsafe_code)]
 
 mod checks;
+#[cfg(target_os = "linux")]
+mod memory;
 
 use std::sync::LazyLock;
 

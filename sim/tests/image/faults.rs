@@ -58,12 +58,8 @@ fn truncated() {
     let file = Nifti::small().bytes();
     let voxels = "cut off: it ends before the 24 bytes of its voxels";
     refused("NIfTI", &file[..file.len() - 1], voxels);
-    refused("NIfTI's header", &file[..350], "cut off: it ends before the 4 bytes of its header");
-    refused(
-        "packed before",
-        &gzip(&file[..file.len() - 1]),
-        "cut off: it ends before the 4 bytes of its voxels",
-    );
+    refused("NIfTI's header", &file[..350], "cut off: it ends before the 352 bytes of its header");
+    refused("packed before", &gzip(&file[..file.len() - 1]), voxels);
     let packed = gzip(&file);
     for length in [packed.len() - 1, packed.len() - 8, packed.len() - 9, 100, 10, 2] {
         let error = Image::read(&packed[..length], length as u64).expect_err("it is cut");
@@ -79,7 +75,7 @@ fn truncated() {
 fn shorter_than_its_length() {
     let file = Nifti::small().bytes();
     let error = Image::read(&file[..file.len() - 5], file.len() as u64).expect_err("it is cut");
-    assert_eq!(error.to_string(), "cut off: it ends before the 4 bytes of its voxels");
+    assert_eq!(error.to_string(), "cut off: it ends before the 24 bytes of its voxels");
     let error = Image::read(&*file, file.len() as u64 - 24).expect_err("it is longer");
     assert_eq!(error.to_string(), "cut off: it ends before the 24 bytes of its voxels");
 }
@@ -142,11 +138,19 @@ fn huge_headers() {
     refused_nrrd("modality", &long, "its header does not end within 65536 bytes");
 }
 
-/// Ten thousand times as much as the header says: it is not unpacked.
+/// A hundred thousand times as much as the header says: it is not unpacked, or it would be found that it cannot be.
 #[test]
 fn gzip_bomb() {
-    let file = Nifti { data: vec![0; 1 << 24], ..Nifti::small() }.bytes();
-    refused("bomb", &gzip(&file), "there is more data after the last voxel");
+    let bomb = Nifti { data: vec![0; 1 << 24], ..Nifti::small() };
+    let packed = |file: &Nifti| {
+        let mut packed = gzip(&file.bytes());
+        packed[4_096..].fill(0xff);
+        packed
+    };
+    refused("bomb", &packed(&bomb), "there is more data after the last voxel");
+    let whole = packed(&Nifti { dim: [3, 256, 256, 128, 1, 1, 1, 1], ..bomb });
+    let error = Image::read(&*whole, whole.len() as u64).expect_err("it is damaged");
+    assert!(error.to_string().starts_with("damaged gzip data: "), "{error}");
 }
 
 #[test]
@@ -281,11 +285,15 @@ fn nrrd_fields() {
     refused_nrrd("modality", "no colon", &expected);
     let twice = "a line of the header is \"Type: int\": it must be the only one of its field";
     refused_nrrd("modality", "Type: int", twice);
-    let units = "units is \"\\\"inch\\\"\": it must be m, cm, mm or um";
-    refused_nrrd("modality", "space units: \"inch\"", units);
+    let units = "is \"\\\"inch\\\"\": it must be m, cm, mm or um";
+    refused_nrrd("modality", "space units: \"inch\"", &format!("space units {units}"));
+    let mut lines = nrrd("raw");
+    lines.retain(|line| !line.starts_with("space"));
+    lines.extend(["spacings: 1 1 1", "units: \"inch\""].map(str::to_owned));
+    refused("units", &nrrd_bytes(&lines, &Nifti::small().data), &format!("units {units}"));
     for bare in ["um um um", "um \"mm\" \"mm\"", "\"um\" \"um\" \"um"] {
         let expected =
-            format!("units is {bare:?}: it must be in quotation marks, one for each axis");
+            format!("space units is {bare:?}: it must be in quotation marks, one for each axis");
         refused_nrrd("modality", &format!("space units: {bare}"), &expected);
     }
     refused_nrrd("modality", "byte skip: 4", "byte or line skip is \"4\": it must be 0");

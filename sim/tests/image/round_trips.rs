@@ -1,7 +1,7 @@
 //! What is read is what was written, where it was written.
 
 use dualframe_sim::image::{Grid, Image, ImageError, Thresholds, Voxel, save, write};
-use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DQuat, DVec3};
 use proptest::prelude::*;
 
 use crate::files::{NUMBERS, Nifti, gzip, nrrd, nrrd_bytes};
@@ -214,6 +214,18 @@ fn a_full_disk_keeps_what_was_there() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn a_link_to_what_is_not_there_yet_stays_one() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [path, link] = ["volume.nii", "link.nii"].map(|name| folder.path().join(name));
+    std::os::unix::fs::symlink("volume.nii", &link).expect("the folder takes it");
+    let image = read(&Nifti::small().bytes());
+    save(&link, image.grid(), image.voxels()).expect("the folder takes it");
+    assert!(std::fs::symlink_metadata(&link).expect("it is there").is_symlink());
+    assert_eq!(Image::open(&path).expect("it is whole"), image);
+}
+
 /// The standard's method 3 before method 2 before method 1.
 #[test]
 fn sform_before_qform_before_distances() {
@@ -279,25 +291,6 @@ fn gzip_in_members() {
     let file = Nifti::small().bytes();
     let members = file.chunks(100).flat_map(gzip).collect::<Vec<u8>>();
     assert_eq!(read(&members), read(&file));
-}
-
-#[test]
-fn pose_of_a_body() {
-    let mut file = Nifti::small();
-    let turn = DQuat::from_rotation_z(0.2);
-    file.set_sform(DAffine3::from_scale_rotation_translation(
-        DVec3::new(-1e-3, 2e-3, 3e-3),
-        turn,
-        DVec3::new(0.1, 0.2, 0.3),
-    ));
-    let grid = read(&file.bytes()).grid().clone();
-    let pose = grid.pose();
-    for voxel in [DVec3::ZERO, DVec3::new(1.0, 2.0, 1.0)] {
-        let inside = ((voxel + 0.5) * grid.spacing()).as_vec3();
-        let expected: Vec3 = grid.affine().transform_point3(voxel).as_vec3();
-        let place = pose.translation + pose.rotation * inside;
-        assert!(place.abs_diff_eq(expected, 1e-6), "{place} is not {expected}");
-    }
 }
 
 #[test]

@@ -161,6 +161,7 @@ fn moved(manager: VeManager, way: Settings, change: impl FnOnce(&mut Scene)) -> 
 pub(crate) struct Played {
     pub(crate) frames: u64,
     pub(crate) hash: u64,
+    pub(crate) letters: u64,
     pub(crate) checkpoints: u64,
     /// Why it ended before the recording did, if so.
     pub(crate) error: Option<ReplayError>,
@@ -183,7 +184,8 @@ pub(crate) fn replay(file: &[u8], way: Settings, most: u64) -> Result<Played, Re
         }
     };
     let (frames, hash) = (manager.frame(), manager.state_hash());
-    Ok(Played { frames, hash, checkpoints: replay.checkpoints(), error })
+    let (letters, checkpoints) = (replay.letters(), replay.checkpoints());
+    Ok(Played { frames, hash, letters, checkpoints, error })
 }
 
 /// All events of a file as text, and why there are no more.

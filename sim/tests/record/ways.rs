@@ -1,7 +1,7 @@
 //! Whatever ran when a session was recorded, and whatever runs when it is replayed.
 
 use dualframe_sim::blocking::Grain;
-use dualframe_sim::executor::{Entry, ExecutorKind, OnFrame};
+use dualframe_sim::executor::{Entry, ExecutorKind, FrameRecord, OnFrame};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::message::{Custom, Message};
 use dualframe_sim::object::{Object, ObjectId};
@@ -96,6 +96,60 @@ fn a_session_that_did_not_begin() {
     manager.run(1, &mut NullRenderer::new(), &mut |_| {}).expect("it runs");
     let begun = Recorder::begin(Vec::new(), &Header::of(&spec), &manager);
     assert!(matches!(begun, Err(RecordError::Begun { frame: 1 })));
+}
+
+/// A run of no frames takes no message that the recorder does not see.
+#[test]
+fn what_was_posted_before_the_recorder_began() {
+    for &executor in ExecutorKind::ALL {
+        let way = Settings { executor, threads: 2, ..Settings::default() };
+        let scene = spec(4).build().expect("a valid scene");
+        let mut manager = VeManager::new(scene, way).expect("valid settings");
+        let mut renderer = NullRenderer::new();
+        manager.mailbox().post(ObjectId(3), Message::Impulse { node: 0, impulse: [1e-3; 3] });
+        manager.run(0, &mut renderer, &mut |_| {}).expect("it runs");
+        let mut recorder =
+            Recorder::begin(Vec::new(), &Header::of(&spec(4)), &manager).expect("a start");
+        recorder.run(&mut manager, 3, &mut renderer, &mut |_| {}).expect("it runs");
+        let (file, totals) = recorder.finish(&manager).expect("it is written");
+        assert_eq!(totals.letters, 1, "{executor:?}");
+        let played = replay(&file, way, 10).expect("a header");
+        assert!(played.error.is_none(), "{executor:?}: {:?}", played.error);
+        assert_eq!((played.hash, played.letters), (manager.state_hash(), 1), "{executor:?}");
+    }
+}
+
+/// Of the same session, and of one that differs at its first checkpoint.
+#[test]
+fn messages_are_counted_when_they_were_played() {
+    let spec = ParticleScene::new(5);
+    let recorded = |named: ParticleScene| {
+        let scene = spec.build().expect("a valid scene");
+        let mut manager = VeManager::new(scene, serial()).expect("valid settings");
+        let mut recorder =
+            Recorder::begin(Vec::new(), &Header::of(&named), &manager).expect("a start");
+        let mailbox = manager.mailbox();
+        let post = |count| (0..count).for_each(|_| mailbox.post(ObjectId(0), Message::Release));
+        post(1);
+        let mut on_frame = |record: &FrameRecord| {
+            // Processed two frames later.
+            let count = [(0, 10), (57, 100), (58, 1_000), (59, 10_000), (69, 100_000)];
+            let count = count.into_iter().find(|&(frame, _)| frame == record.frame);
+            post(count.map_or(0, |(_, count)| count));
+        };
+        let mut renderer = NullRenderer::new();
+        recorder.run(&mut manager, 70, &mut renderer, &mut on_frame).expect("it runs");
+        recorder.finish(&manager).expect("it is written").0
+    };
+    let (same, other) = (recorded(spec), recorded(ParticleScene { gravity: true, ..spec }));
+    for most in [1, 13, u64::MAX] {
+        let played = replay(&same, serial(), most).expect("a header");
+        assert!(played.error.is_none(), "{:?}", played.error);
+        assert_eq!((played.frames, played.letters), (70, 11_111), "by {most}");
+        let played = replay(&other, serial(), most).expect("a header");
+        assert!(matches!(played.error, Some(ReplayError::Differs(_))), "{:?}", played.error);
+        assert_eq!((played.frames, played.letters), (60, 111), "by {most}");
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ mod write;
 
 use super::Image;
 use super::error::ImageError;
-use super::stream::Stream;
+use super::stream::{Part, Stream};
 use header::Header;
 
 pub use write::{Voxel, save, write};
@@ -17,8 +17,9 @@ pub use write::{Voxel, save, write};
 /// Reads what begins with a header.
 pub(super) fn read(mut stream: Stream<'_>) -> Result<Image, ImageError> {
     let mut bytes = [0; Header::BYTES];
-    stream.read(&mut bytes, "header")?;
+    let part = Part { name: "header", bytes: Header::BYTES as u64 };
+    stream.read(&mut bytes, part)?;
     let header = Header::new(&bytes)?;
-    stream.skip(header.gap, "header")?;
+    stream.skip(header.gap, Part { bytes: part.bytes + header.gap, ..part })?;
     Image::decode(header.grid, &header.samples, &mut stream)
 }

@@ -44,8 +44,8 @@ voxel!(u16, 512);
 /// Writes a volume to a file, packed by gzip if its name ends in `.gz`; as [`write()`].
 ///
 /// It is written beside the file and takes its place when it is whole, so that a full disk leaves what was there. Where
-/// nothing can be put beside it (the folder is another's, the name is too long for more), and where it is a device or a
-/// pipe, it is written as it is.
+/// nothing can be put beside it (the folder is another's, the name is too long for more), and where it is a device, a
+/// pipe or a link to a file that is not there yet, it is written as it is.
 ///
 /// # Errors
 /// As [`write()`], or the file cannot be created. What is whole, but can neither take the file's place nor be copied
@@ -55,7 +55,9 @@ pub fn save<V: Voxel>(path: &Path, grid: &Grid, voxels: &[V]) -> Result<(), File
     let save = || {
         grid.check_length(voxels.len())?;
         let there = fs::metadata(path);
-        if there.as_ref().is_ok_and(|there| !there.is_file()) {
+        // Where such a link leads to, only the system knows.
+        let leads_nowhere = there.is_err() && path.is_symlink();
+        if leads_nowhere || there.as_ref().is_ok_and(|there| !there.is_file()) {
             return fill(&File::create(path)?, packs, grid, voxels);
         }
         // A link stays one.

@@ -103,14 +103,14 @@ fn grid(fields: &Fields) -> Result<Grid, ImageError> {
 fn axes(fields: &Fields) -> Result<(Vec<Axis>, DVec3), ImageError> {
     let lengths = lengths(fields)?;
     let Some(directions) = fields.get("space directions") else {
-        let steps = spacings(fields.require("spacings")?, metres_per_unit(fields.get("units"))?)?;
+        let steps = spacings(fields.require("spacings")?, metres_per_unit(fields, "units")?)?;
         if fields.get("space").is_some() {
             // Which way the axes run in it is not said.
             return Err(ImageError::Missing { name: "space directions" });
         }
         return Ok((joined("spacings", lengths, steps)?, DVec3::ZERO));
     };
-    let unit = metres_per_unit(fields.get("space units"))?;
+    let unit = metres_per_unit(fields, "space units")?;
     let patient = DMat3::from_diagonal(unit * signs(fields.require("space")?)?);
     let steps = vectors("space directions", directions)?.into_iter();
     let steps = steps.map(|step| step.map(|step| patient * step)).collect();
@@ -162,14 +162,14 @@ fn signs(space: &str) -> Result<DVec3, ImageError> {
     }
 }
 
-/// Metres per unit of length; without a unit, everyone means millimetres.
-fn metres_per_unit(units: Option<&str>) -> Result<f64, ImageError> {
-    let units = units.unwrap_or_default();
+/// Metres per unit of length, by one of the fields; without a unit, everyone means millimetres.
+fn metres_per_unit(fields: &Fields, field: &'static str) -> Result<f64, ImageError> {
+    let units = fields.get(field).unwrap_or_default();
     // Each stands in quotation marks, empty ones for axes that are not in space.
     let marks = units.matches('"').count();
     let bare = units.split('"').step_by(2);
     if marks % 2 == 1 || bare.flat_map(str::chars).any(|letter| !letter.is_whitespace()) {
-        return Err(ImageError::field("units", units, "in quotation marks, one for each axis"));
+        return Err(ImageError::field(field, units, "in quotation marks, one for each axis"));
     }
     let mut names = units.split('"').skip(1).step_by(2).filter(|name| !name.is_empty());
     let first = names.next().unwrap_or("mm");
@@ -178,12 +178,12 @@ fn metres_per_unit(units: Option<&str>) -> Result<f64, ImageError> {
         "cm" => 1e-2,
         "mm" => 1e-3,
         "um" | "µm" => 1e-6,
-        _ => return Err(ImageError::field("units", units, "m, cm, mm or um")),
+        _ => return Err(ImageError::field(field, units, "m, cm, mm or um")),
     };
     if names.all(|name| name == first) {
         return Ok(metres);
     }
-    Err(ImageError::field("units", units, "the same for all axes"))
+    Err(ImageError::field(field, units, "the same for all axes"))
 }
 
 /// The nth axis in space runs along the nth of the patient; one of spacing NaN is not in space.

@@ -7,7 +7,7 @@
 //! | [`Operation`] | what the host does: it moves the hands, keeps the score and frees bone |
 //! | `feel` | joins a hand with a haptic loop, so that it moves a tool and feels it |
 //! | `freeing` | bone that a closed cut has freed becomes an object of its own |
-//! | [`Score`] | what educators measure |
+//! | [`Report`] | what educators measure |
 //! | `opening` | how the opening in the skull came out, beside the plan |
 
 mod build;
@@ -24,7 +24,7 @@ use crate::object::{Group, ObjectId};
 pub use build::{BuildError, build};
 pub use opening::Margin;
 pub use operation::{LOOK_FRAMES, Operation};
-pub use score::{Placement, Report, Score};
+pub use score::{Placement, Report};
 pub use steps::Step;
 
 use super::head::Head;

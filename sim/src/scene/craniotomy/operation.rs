@@ -68,7 +68,8 @@ impl<'c> Operation<'c> {
         }
     }
 
-    /// Takes the haptic loops' ends back: hands are scripted again, and loops feel nothing.
+    /// Takes the haptic loops' ends back: loops feel nothing, and hands are scripted again, each from where the
+    /// script next moves it. Until then its tool stays as the device left it, buttons included.
     pub fn unlink(&mut self) -> [Option<SimulationEnd<'c>>; 2] {
         let end = |feel: Mutex<Feel<'c>>| {
             feel.into_inner().unwrap_or_else(PoisonError::into_inner).into_end()

@@ -17,7 +17,7 @@ const DURA_GIVES: f32 = 0.001;
 
 /// What is counted while an operation goes on; see [`Operation::report`](super::Operation::report).
 #[derive(Clone, Debug)]
-pub struct Score {
+pub(super) struct Score {
     time_step: f32,
     frames: u64,
     drilling: u64,
@@ -85,8 +85,7 @@ pub struct Report {
 
 impl Score {
     /// Of an operation that begins; `time_step` is a frame's, in seconds.
-    #[must_use]
-    pub fn new(time_step: f32) -> Self {
+    pub(super) fn new(time_step: f32) -> Self {
         Self {
             time_step,
             frames: 0,
@@ -107,7 +106,7 @@ impl Score {
     }
 
     /// A frame is over.
-    pub fn frame(&mut self) {
+    pub(super) fn frame(&mut self) {
         self.frames += 1;
         let [turned, in_air] = std::mem::take(&mut self.now).map(u64::from);
         self.drilling += turned;
@@ -116,7 +115,12 @@ impl Score {
 
     /// Notes what tool number `hand` (0 or 1) did in this frame. `past_inner_table` says how far a place is
     /// past the skull's inner table, in metres, negative before it.
-    pub fn note(&mut self, hand: usize, tool: &Object, past_inner_table: impl Fn(Vec3) -> f32) {
+    pub(super) fn note(
+        &mut self,
+        hand: usize,
+        tool: &Object,
+        past_inner_table: impl Fn(Vec3) -> f32,
+    ) {
         let (Some(tool), Some(rigid)) = (Tool::of(tool), tool.geometry.as_rigid()) else { return };
         let work = tool.work();
         self.tissue_peak = self.tissue_peak.max(work.tissue.length());

@@ -41,7 +41,7 @@ use self::frame::{Field, Frame};
 use self::layers::{Layers, Rays, centered, largest_room};
 use self::skull::{Bone, Lattice};
 use crate::geometry::Volume;
-use crate::image::{AIR, Image, Thresholds};
+use crate::image::{self, AIR, Image, Thresholds};
 
 pub use self::attachments::Attachment;
 pub use self::error::HeadError;
@@ -80,8 +80,9 @@ impl Head {
     ///
     /// # Errors
     /// No bone, or in more places than [`HeadError::MAX_RUNS`]; an image of more than
-    /// [`HeadError::MAX_VOLUME`]; no memory; no room with bone around it in which a brain could be; a structure
-    /// of which nothing is in the image.
+    /// [`HeadError::MAX_VOLUME`]; no memory for the densities of its voxels, a byte each; no room with bone
+    /// around it in which a brain could be; a structure of which nothing is in the image. Where there is no memory
+    /// for what is built from these, the process is aborted, as Rust programs are.
     pub fn from_ct(image: Image, thresholds: &Thresholds) -> Result<Self, HeadError> {
         let (grid, dims) = (image.grid().clone(), image.grid().dims());
         let volume = grid.spacing().element_product() * grid.voxels() as f64;
@@ -109,7 +110,7 @@ impl Head {
         }
         let layers = rays.layers();
         let lattice = Lattice::around(&layers);
-        let bone = Bone::new(lattice, rays.bone);
+        let bone = Bone::new(lattice, rays.bone)?;
         let (skull, structures) = rayon::join(|| bone.volume(), || structures::structures(&layers));
         let (skull, structures) = (skull?, structures?);
         let attachments = attachments::attachments(&structures);
@@ -163,7 +164,8 @@ impl Head {
     /// [`save`](crate::image::save) writes the result's voxels with its grid.
     ///
     /// # Errors
-    /// `skull` has not the voxels of this head's.
+    /// `skull` has not the voxels of this head's; no memory, of which it takes some two bytes for each of the
+    /// image's voxels and one for each of the skull's.
     pub fn drilled(&self, skull: &Volume, also: &[&Volume]) -> Result<Image, HeadError> {
         if skull.dims() != self.lattice.dims {
             return Err(HeadError::NotTheSkull { given: skull.dims(), skull: self.lattice.dims });
@@ -178,8 +180,9 @@ impl Head {
             .spacing()
             .to_array()
             .map(|spacing| (spacing / f64::from(skull::SPACING)).ceil().max(1.0) as u32);
-        let mut voxels = self.image.voxels().to_vec();
-        Bone::new(self.lattice, field).carve(&mut voxels, skull, also, to_world, samples);
+        let mut voxels = image::room(grid.voxels())?;
+        voxels.extend_from_slice(self.image.voxels());
+        Bone::new(self.lattice, field)?.carve(&mut voxels, skull, also, to_world, samples)?;
         Ok(Image::new(grid.clone(), voxels)?)
     }
 }

@@ -7,7 +7,7 @@ use super::error::HeadError;
 use super::frame::{Field, UP, parts};
 use super::layers::Layers;
 use crate::geometry::{BRICK_SIDE, Bounds, Volume};
-use crate::image::AIR;
+use crate::image::{AIR, ImageError, room};
 
 /// The distance between voxels, in metres; usually 0.5 mm, at which a burr's force is smooth.
 pub(super) const SPACING: f32 = 0.000_5;
@@ -72,10 +72,12 @@ pub(super) struct Bone<'a> {
 const BLOCK: usize = 2;
 
 impl<'a> Bone<'a> {
-    pub(super) fn new(lattice: Lattice, field: Field<'a, u8>) -> Self {
+    pub(super) fn new(lattice: Lattice, field: Field<'a, u8>) -> Result<Self, ImageError> {
         let dims = field.dims.map(|side| side as usize);
         let blocks = dims.map(|side| side.div_ceil(BLOCK));
-        let mut occupied = vec![false; blocks.iter().product()];
+        let count = blocks.iter().product();
+        let mut occupied = room(count)?;
+        occupied.resize(count, false);
         for (row, densities) in field.voxels.chunks_exact(dims[0]).enumerate() {
             let (y, z) = (row % dims[1] / BLOCK, row / dims[1] / BLOCK);
             let first = (z * blocks[1] + y) * blocks[0];
@@ -83,7 +85,7 @@ impl<'a> Bone<'a> {
                 occupied[first + block] |= densities.iter().any(|&density| density > 0);
             }
         }
-        Self { lattice, field, occupied, blocks }
+        Ok(Self { lattice, field, occupied, blocks })
     }
 
     /// The density of a voxel, of 255.
@@ -126,9 +128,10 @@ impl<'a> Bone<'a> {
 
     /// What is gone of each voxel's density: what is left of it is in `skull`, and in `also` where they
     /// are now.
-    fn gone(&self, skull: &Volume, also: &[&Volume]) -> Vec<u8> {
+    fn gone(&self, skull: &Volume, also: &[&Volume]) -> Result<Vec<u8>, ImageError> {
         let count = self.lattice.dims.iter().map(|&side| side as usize).product();
-        let mut gone = vec![0; count];
+        let mut gone = room(count)?;
+        gone.resize(count, 0);
         for brick in skull.bricks() {
             if !self.may_hold(brick.first(), BRICK_SIDE) {
                 continue;
@@ -151,7 +154,7 @@ impl<'a> Bone<'a> {
                 }
             }
         }
-        gone
+        Ok(gone)
     }
 
     /// Lowers an image's numbers where bone is gone, by the share of each voxel's bone that is: towards
@@ -163,8 +166,8 @@ impl<'a> Bone<'a> {
         also: &[&Volume],
         to_world: impl Fn([f64; 3]) -> Vec3,
         samples: [u32; 3],
-    ) {
-        let gone = self.gone(skull, also);
+    ) -> Result<(), ImageError> {
+        let gone = self.gone(skull, also)?;
         let [wide, high, _] = self.field.dims.map(|side| side as usize);
         for (number, hounsfield) in hounsfield.iter_mut().enumerate() {
             if self.field.voxels[number] == 0 {
@@ -189,5 +192,6 @@ impl<'a> Bone<'a> {
                 *hounsfield = (f64::from(AIR) + above_air.max(0.0) * left).round() as i16;
             }
         }
+        Ok(())
     }
 }
