@@ -72,7 +72,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         let homes = (config.homes as usize).clamp(1, MOST_HOMES);
         let tables = Tables::new(memory, config.broad_phase == BroadPhase::Pairwise, homes)?;
         Ok(Self {
-            window: Window::new(tables.units.len() as u32),
+            window: Window::new(tables.units.len() as u32, Frame(0)),
             bells: Bells::new(),
             waiting,
             office: TokenOffice::new(config.tokens),
@@ -266,3 +266,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         }
     }
 }
+
+#[cfg(all(test, not(loom)))]
+#[path = "pipeline_tests.rs"]
+mod tests;
