@@ -158,7 +158,8 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     }
 
     /// Posts a letter from outside the callbacks: a device, an interrupt handler, a user
-    /// interface. It is processed by `to`'s first update in a later frame than the one now open.
+    /// interface. It is processed by `to`'s first update in a later frame than the one now open, or sooner where
+    /// this thread does not know yet that another one has opened that.
     ///
     /// # Errors
     /// [`Rejected`] with the letter if all letters are under way, or if there is no unit `to`.
