@@ -18,6 +18,7 @@ use crate::checker::{Expected, check};
 use crate::host::{Failure, Host, Screen};
 use crate::random_ve::{Case, Fault, OUTSIDE};
 use crate::reference::{self, Outcome};
+use crate::seen::Seen;
 use crate::trace::{Act, Record, Trace};
 use crate::watchdog;
 
@@ -60,11 +61,11 @@ struct Shop<'p, 'c> {
     broken: AtomicBool,
 }
 
-/// Runs `case` and says everything that was wrong.
+/// Runs `case` and says how much was seen, or everything that was wrong.
 ///
 /// # Errors
 /// A list of what was wrong, a line each.
-pub fn run(case: &Case) -> Result<(), String> {
+pub fn run(case: &Case) -> Result<Seen, String> {
     let _watch = watchdog::watch(format!("{case:?}"));
     let trace = Trace::default();
     let (outcome, mut wrong) = run_pipeline(case, &trace);
@@ -80,10 +81,11 @@ pub fn run(case: &Case) -> Result<(), String> {
         }
     }
     wrong.extend(compare_failures(&outcome.failures, &expected.failures));
-    let broken = check(&Expected::of(case), &trace.records());
+    let records = trace.records();
+    let broken = check(&Expected::of(case), &records);
     wrong.extend(broken.iter().map(|broken| format!("{broken:?}")));
     if wrong.is_empty() {
-        return Ok(());
+        return Ok(Seen::of(&records, outcome.failures.len()));
     }
     let count = wrong.len();
     wrong.truncate(12);
