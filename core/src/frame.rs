@@ -62,12 +62,13 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    pub(crate) fn new(units: u32) -> Self {
+    /// At rest before `first`.
+    pub(crate) fn new(units: u32, first: Frame) -> Self {
         Self {
             renders: CachePadded::new(Countdown::new(units)),
-            display: CachePadded::new(Atomic::new(0)),
-            open: CachePadded::new(Atomic::new(u32::MAX)),
-            limit: Frame(0),
+            display: CachePadded::new(Atomic::new(first.0)),
+            open: CachePadded::new(Atomic::new(first.previous().0)),
+            limit: first,
             units,
         }
     }

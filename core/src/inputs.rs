@@ -12,7 +12,15 @@ use crate::sync::site;
 use crate::tables::Tables;
 use crate::unit::{InteractionId, NONE, UnitId};
 
-/// One unit's inputs to one update: for the thread that updates it.
+/// One unit's inputs to one update: for the thread that updates it. Taking them compiles,
+///
+/// ```
+/// use dualframe_core::{environment::Environment, inputs::Inputs};
+/// fn shared<T: Sync>(_: &T) {}
+/// fn update<E: Environment>(inputs: &Inputs<E>) {}
+/// ```
+///
+/// and sharing them does not:
 ///
 /// ```compile_fail,E0277
 /// use dualframe_core::{environment::Environment, inputs::Inputs};

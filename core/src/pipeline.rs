@@ -72,7 +72,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         let homes = (config.homes as usize).clamp(1, MOST_HOMES);
         let tables = Tables::new(memory, config.broad_phase == BroadPhase::Pairwise, homes)?;
         Ok(Self {
-            window: Window::new(tables.units.len() as u32),
+            window: Window::new(tables.units.len() as u32, Frame(0)),
             bells: Bells::new(),
             waiting,
             office: TokenOffice::new(config.tokens),
@@ -158,7 +158,8 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     }
 
     /// Posts a letter from outside the callbacks: a device, an interrupt handler, a user
-    /// interface. It is processed by `to`'s first update in a later frame than the one now open.
+    /// interface. It is processed by `to`'s first update in a later frame than the one now open, or sooner where
+    /// this thread does not know yet that another one has opened that.
     ///
     /// # Errors
     /// [`Rejected`] with the letter if all letters are under way, or if there is no unit `to`.
@@ -266,3 +267,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         }
     }
 }
+
+#[cfg(all(test, not(loom)))]
+#[path = "pipeline_tests.rs"]
+mod tests;

@@ -233,4 +233,31 @@ mod tests {
             assert!(ring.looks_empty());
         }
     }
+
+    /// An empty ring that has been pushed to and popped from up to position `start`.
+    fn come_to(start: usize, slots: &mut [QueueSlot]) -> IndexRing<'_> {
+        let ring = IndexRing::new(slots).unwrap_or_else(|full| panic!("{full}"));
+        for popped in start - ring.cells.len()..start {
+            ring.slot(popped).store(ring.cycle(popped) << ring.slot_bits, site::EXCLUSIVE);
+        }
+        ring.head.store(start, site::EXCLUSIVE);
+        ring.tail.store(start, site::EXCLUSIVE);
+        ring
+    }
+
+    #[test]
+    fn positions_wrap() {
+        let mut slots = [const { QueueSlot::new() }; 4];
+        // One index at a time first: a lap that is miscounted is seen before a push could look for it for ever.
+        for filled in [1, 4] {
+            let ring = come_to(usize::MAX - 2 * 4, &mut slots);
+            while ring.cycle(ring.head.load(site::EXCLUSIVE)) != 2 {
+                assert!(ring.looks_empty());
+                assert_eq!(ring.pop(), None);
+                (0..filled).for_each(|index| assert_eq!(ring.push(index), Ok(())));
+                assert!(!ring.looks_empty());
+                (0..filled).for_each(|index| assert_eq!(ring.pop(), Some(index)));
+            }
+        }
+    }
 }

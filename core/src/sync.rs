@@ -1,5 +1,6 @@
-//! The only file that names atomics, fences and cells: `core`'s, `portable-atomic`'s, or loom's. Under
-//! shuttle, which runs all threads on one, they are `core`'s, and each access lets others run first.
+//! The only file that names atomics, fences and cells: `core`'s, `portable-atomic`'s, or loom's. The records of
+//! `contacts.rs` alone are in cells that loom does not watch. Under shuttle, which runs all threads on one, they are
+//! `core`'s, and each access lets others run first.
 //!
 //! Every atomic access elsewhere passes a [`Site`]: a name and the memory order that
 //! `core/PROTOCOL.md` gives it a reason for. An access without a site does not compile, and

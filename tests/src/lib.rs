@@ -1,5 +1,5 @@
 //! Support for tests of the pipeline as a whole: random virtual environments, a trace of what
-//! their callbacks saw, a checker of that trace, a sequential reference, and a watchdog.
+//! their callbacks saw, a checker of that trace, counts of what was seen, a sequential reference, and a watchdog.
 #![forbid(unsafe_code)]
 
 pub mod body;
@@ -8,5 +8,6 @@ pub mod drive;
 pub mod host;
 pub mod random_ve;
 pub mod reference;
+pub mod seen;
 pub mod trace;
 pub mod watchdog;

@@ -40,6 +40,7 @@ const WAYS_AROUND: &[&str] = &[
     "AtomicUsize",
     "AtomicPtr",
     "AtomicCell",
+    "UnsafeCell",
     "volatile",
     "intrinsics",
     "asm!",
@@ -70,6 +71,10 @@ fn no_file_but_sync_names_atomics() {
         let around = match name.as_str() {
             // It is handed orders, and makes no access; its memory is one thread's.
             "instrument.rs" => Vec::new(),
+            // Its records are raw memory, whose segment headers are watched.
+            "contacts.rs" => {
+                ways_around(code).into_iter().filter(|&way| way != "UnsafeCell").collect()
+            }
             _ => ways_around(code),
         };
         assert!(around.is_empty(), "{name}: {around:?}");
@@ -111,6 +116,7 @@ fn every_site_is_used_and_explained() {
 fn accesses_without_a_site_are_noticed() {
     assert_eq!(ways_around("use core::sync::atomic::AtomicU32;").len(), 3);
     assert_eq!(ways_around("flag.load(Ordering::Relaxed)"), ["Ordering::"]);
+    assert_eq!(ways_around("use core::cell::UnsafeCell;"), ["UnsafeCell"]);
     assert_eq!(unnamed_accesses("self.0.load(Ordering::SeqCst)").len(), 1);
     assert_eq!(unnamed_accesses("imp::fence(Ordering::SeqCst);").len(), 1);
 }

@@ -4,7 +4,7 @@ use std::sync::{Barrier, Mutex};
 
 use dualframe_core::contacts::{ContactSlot, Contacts, SegmentSlot};
 use dualframe_core::environment::{Environment, Pair};
-use dualframe_core::error::TableFull;
+use dualframe_core::error::{Table, TableFull};
 use dualframe_core::frame::Frame;
 use dualframe_core::inbox::{From, LetterSlot};
 use dualframe_core::inputs::Inputs;
@@ -20,10 +20,16 @@ use dualframe_core::worker::{Step, Worker};
 /// Every two units meet, or none do. Interactions push two records.
 pub(crate) struct Crowd {
     pub(crate) near: bool,
-    /// Whether each unit writes itself two letters in each frame; otherwise letters are left unread.
+    /// Whether letters are read.
+    pub(crate) reads: bool,
+    /// Whether each unit writes itself two letters in each frame.
     pub(crate) writes: bool,
     /// Whether rendering panics.
     pub(crate) breaks: bool,
+    /// What rendering returns.
+    pub(crate) rendered: Result<(), TableFull>,
+    /// What swapping returns.
+    pub(crate) swapped: Result<(), TableFull>,
 }
 
 /// What a unit found in its last update: whom it met, and its letters.
@@ -64,8 +70,10 @@ impl Environment for Crowd {
         inputs: &mut Inputs<'_, '_, Self>,
     ) -> Result<(), TableFull> {
         found.met = inputs.interactions().map(|interaction| interaction.other.0).collect();
-        if self.writes {
+        if self.reads {
             found.read = std::iter::from_fn(|| inputs.next_letter()).collect();
+        }
+        if self.writes {
             for message in ["first", "second"] {
                 inputs.post(unit, unit.0, message).map_err(|rejected| rejected.full)?;
             }
@@ -75,15 +83,22 @@ impl Environment for Crowd {
 
     fn render(&self, _: UnitId, _: Frame, _: &Found, (): &mut ()) -> Result<(), TableFull> {
         assert!(!self.breaks, "on purpose");
-        Ok(())
+        self.rendered
     }
 
     fn swap(&self, _: Frame, (): &mut ()) -> Result<(), TableFull> {
-        Ok(())
+        self.swapped
     }
 }
 
-pub(crate) const NEAR: Crowd = Crowd { near: true, writes: false, breaks: false };
+pub(crate) const NEAR: Crowd = Crowd {
+    near: true,
+    reads: false,
+    writes: false,
+    breaks: false,
+    rendered: Ok(()),
+    swapped: Ok(()),
+};
 pub(crate) const FAR: Crowd = Crowd { near: false, ..NEAR };
 /// Far from each other, and rendering panics.
 pub(crate) const BREAKS: Crowd = Crowd { breaks: true, ..FAR };
@@ -179,6 +194,11 @@ pub(crate) const INTERACTED: Result<Step, TableFull> = worked(Stage::Interaction
 pub(crate) const UPDATED: Result<Step, TableFull> = worked(Stage::Update);
 pub(crate) const RENDERED: Result<Step, TableFull> = worked(Stage::Render);
 pub(crate) const IDLE: Result<Step, TableFull> = Ok(Step::Idle);
+
+/// One of several errors that can be told apart.
+pub(crate) const fn error(needed: usize) -> TableFull {
+    TableFull { table: Table::Contacts, capacity: 0, needed }
+}
 
 /// Writes down what a worker begins; what it ends must be the same.
 #[derive(Default)]

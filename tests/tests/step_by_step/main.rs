@@ -3,12 +3,12 @@
 #![forbid(unsafe_code)]
 
 mod crowd;
+mod letters;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Barrier;
 
 use dualframe_core::frame::Frame;
-use dualframe_core::inbox::From;
 use dualframe_core::probe::NoProbe;
 use dualframe_core::unit::{InteractionId, UnitId, Work};
 use dualframe_core::worker::Step;
@@ -16,7 +16,7 @@ use dualframe_tests::watchdog;
 
 use crowd::{
     BREAKS, Crowd, ENTERED, FAR, IDLE, INTERACTED, Log, NEAR, Notes, RENDERED, UPDATED, alone,
-    finish, hold, units, with, with_notes,
+    error, finish, hold, units, with, with_notes,
 };
 
 #[test]
@@ -186,6 +186,23 @@ fn a_holder_renders_what_waits_first_and_carries_its_own() {
 }
 
 #[test]
+fn an_error_of_the_swap_comes_out_unless_its_rendering_has_one() {
+    with(1, 1, 1, |mut pipeline, _| {
+        let (drawing, swapping) = (Err(error(1)), Err(error(2)));
+        let ways = [(Ok(()), swapping), (drawing, Ok(())), (drawing, swapping)];
+        for ((rendered, swapped), reported) in ways.into_iter().zip([2, 1, 1].map(error)) {
+            pipeline.run(1).expect("at rest");
+            let mut worker = pipeline.worker();
+            hold(&pipeline, &mut worker);
+            let fails = Crowd { rendered, swapped, ..FAR };
+            assert_eq!([worker.step(&fails), worker.step(&fails)], [ENTERED, UPDATED]);
+            assert_eq!(worker.step(&fails), Err(reported));
+            assert!(pipeline.finished());
+        }
+    });
+}
+
+#[test]
 fn a_token_goes_from_hand_to_hand() {
     with(1, 1, 1, |mut pipeline, _| {
         pipeline.run(1).expect("at rest");
@@ -350,38 +367,6 @@ fn high_water_is_what_one_frame_used() {
 }
 
 #[test]
-fn waiting_letters_are_taken() {
-    with(3, 1, 1, |mut pipeline, _| {
-        let from = From { sender: 7, sequence: 3 };
-        for (round, message) in ["before the first frame", "after it"].into_iter().enumerate() {
-            let to = UnitId(round as u32 + 1);
-            assert_eq!(pipeline.post(to, from, message), Ok(()));
-            let mut taken = vec![];
-            pipeline.take_letters(|to, from, message| taken.push((to, from, message)));
-            assert_eq!(taken, [(to, from, message)]);
-            pipeline.take_letters(|_, _, _| unreachable!("they were taken"));
-            pipeline.run(1).expect("at rest");
-            finish(&pipeline, &FAR);
-        }
-    });
-}
-
-#[test]
-fn a_letter_that_is_not_read_leaves_room_for_another() {
-    with(1, 1, 1, |mut pipeline, _| {
-        for sequence in 0..3 {
-            let from = From { sender: 0, sequence };
-            for _ in 0..2 {
-                assert_eq!(pipeline.post(UnitId(0), from, "nothing"), Ok(()));
-            }
-            assert!(pipeline.post(UnitId(0), from, "too much").is_err());
-            pipeline.run(1).expect("at rest");
-            finish(&pipeline, &FAR);
-        }
-    });
-}
-
-#[test]
 fn interactions_come_in_pair_order() {
     with(5, 1, 1, |mut pipeline, _| {
         pipeline.run(2).expect("at rest");
@@ -389,16 +374,5 @@ fn interactions_come_in_pair_order() {
         for (unit, found) in (0..).zip(pipeline.objects_mut()) {
             assert!(found.met.iter().copied().eq((0..5).filter(|&other| other != unit)));
         }
-    });
-}
-
-#[test]
-fn letters_of_one_update_keep_their_order() {
-    with(1, 1, 1, |mut pipeline, _| {
-        pipeline.run(3).expect("at rest");
-        finish(&pipeline, &Crowd { writes: true, ..FAR });
-        let from = |sequence| From { sender: 0, sequence };
-        let found = pipeline.objects_mut().next().map(|found| found.read.as_slice());
-        assert_eq!(found, Some(&[(from(0), "first"), (from(1), "second")][..]));
     });
 }

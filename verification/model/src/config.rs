@@ -29,8 +29,10 @@ pub enum Bug {
     ArmedAfterPublishing,
     /// Update(f + 1) does not wait for Render(f).
     RenderNotCounted,
-    /// A unit leaves the gate, and only then counts the candidates that it found.
+    /// A unit lets the candidates that it found go, leaves the gate, and only then counts them.
     CountedAfterGate,
+    /// A unit leaves the gate when it arrives, and only then counts the candidates that it found and lets them go.
+    OpenedByLastArriver,
     /// A unit's update does not wait for the others' entries.
     NoGate,
     /// A frame's arrivals still count when the next one's first units enter.

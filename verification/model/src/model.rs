@@ -49,7 +49,8 @@ impl Protocol {
                 carries.iter().for_each(|&carry| may(Act::Call { carry }));
             }
             At::Swapping => may(Act::Call { carry: false }),
-            At::Opening(..)
+            At::Found(..)
+            | At::Opening(..)
             | At::Interacted(_)
             | At::Passing { .. }
             | At::Advancing(_)
@@ -114,10 +115,9 @@ impl Protocol {
     }
 
     fn tests(&self, pair: u8, may: &mut impl FnMut(Act)) {
-        let carries: &[bool] = if self.0.sleep { &[false, true] } else { &[false] };
-        carries.iter().for_each(|&carry| may(Act::Test { pair, near: true, carry }));
+        may(Act::Test { pair, near: true });
         if self.0.may_miss {
-            may(Act::Test { pair, near: false, carry: false });
+            may(Act::Test { pair, near: false });
         }
     }
 

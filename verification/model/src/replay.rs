@@ -124,7 +124,8 @@ struct Replay {
 fn only_frees(at: At) -> bool {
     matches!(
         at,
-        At::AtGate(..)
+        At::Found(..)
+            | At::AtGate(..)
             | At::Opening(..)
             | At::Interacted(_)
             | At::Passing { .. }
@@ -241,7 +242,7 @@ impl Replay {
                 }
                 Act::Take(work)
             }
-            Event::Test(ends, near) => Act::Test { pair: self.pair(ends)?, near, carry: false },
+            Event::Test(ends, near) => Act::Test { pair: self.pair(ends)?, near },
             Event::Call(task, frame) => {
                 let work = self.work(task)?;
                 let callback = match work {

@@ -15,30 +15,57 @@ impl Step<'_> {
         if near {
             self.claim(Rule::ExactlyOnce, self.state.found >> pair & 1 == 0);
             self.state.found |= 1 << pair;
-            if self.config.has(Bug::CountedAfterGate) {
-                self.worker().uncounted |= 1 << pair;
-            } else {
-                self.count(pair);
-            }
-            self.emit(Work::Interact(pair));
+            self.worker().uncounted |= 1 << pair;
         }
         if let At::Arriving(unit, left) = self.at() {
             self.state.arrived &= !(1 << pair);
-            self.goes_to(At::Arriving(unit, left & !(1 << pair)));
+            self.arriving(unit, left & !(1 << pair));
         }
-        self.leave_if_tested();
+    }
+
+    /// `unit` has still to arrive at the pairs `left` (`Pairwise`).
+    fn arriving(&mut self, unit: u8, left: u64) {
+        if left == 0 {
+            self.arrived(unit);
+        } else {
+            self.goes_to(At::Arriving(unit, left));
+        }
+    }
+
+    /// `unit` has arrived; nobody but this worker knows yet of the pairs that it found.
+    fn arrived(&mut self, unit: u8) {
+        if self.config.has(Bug::OpenedByLastArriver) {
+            self.goes_to(At::AtGate(unit, Then::End));
+        } else {
+            let found = std::mem::take(&mut self.worker().uncounted);
+            self.found(unit, found);
+        }
+    }
+
+    /// `unit` leaves the gate when the pairs that it found are counted and let go.
+    fn found(&mut self, unit: u8, pairs: u64) {
+        self.goes_to(match pairs {
+            0 => At::AtGate(unit, Then::End),
+            _ => At::Found(unit, pairs),
+        });
+    }
+
+    /// Counts the first of `pairs` at both ends and lets it go.
+    fn let_go(&mut self, unit: u8, pairs: u64) {
+        let pair = pairs.trailing_zeros() as u8;
+        if self.config.has(Bug::CountedAfterGate) {
+            self.worker().uncounted |= 1 << pair;
+        } else {
+            self.count(pair);
+        }
+        self.emit(Work::Interact(pair));
+        self.found(unit, pairs & !(1 << pair));
     }
 
     fn count(&mut self, pair: u8) {
         for end in self.config.ends(pair) {
             let pending = &mut self.state.unit(end).pending;
             *pending = pending.wrapping_add(1);
-        }
-    }
-
-    fn leave_if_tested(&mut self) {
-        if let At::Arriving(unit, 0) = self.at() {
-            self.goes_to(At::AtGate(unit, Then::End));
         }
     }
 
@@ -180,17 +207,22 @@ impl Step<'_> {
         match self.at() {
             At::Entering(unit) => {
                 self.state.arrived |= 1 << unit;
-                self.goes_to(At::AtGate(unit, Then::End));
+                self.arrived(unit);
             }
             At::Arriving(unit, left) => {
                 let first = left & left.wrapping_neg();
                 self.state.arrived |= first;
-                self.goes_to(At::Arriving(unit, left & !first));
-                self.leave_if_tested();
+                self.arriving(unit, left & !first);
             }
+            At::Found(unit, pairs) => self.let_go(unit, pairs),
             At::AtGate(unit, then) => self.leave_gate(unit, then),
             At::CountingLate(pairs, then) => {
-                indices(pairs).for_each(|pair| self.count(pair as u8));
+                for pair in indices(pairs).map(|pair| pair as u8) {
+                    self.count(pair);
+                    if self.config.has(Bug::OpenedByLastArriver) {
+                        self.emit(Work::Interact(pair));
+                    }
+                }
                 self.then(then);
             }
             At::Opening(unit, then) => self.open(unit, then),

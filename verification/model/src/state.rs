@@ -67,9 +67,11 @@ pub enum At {
     Entering(u8),
     /// Entering: pairs that are to be arrived at (`Pairwise`).
     Arriving(u8, u64),
+    /// Has arrived with this unit: counts these pairs, which it found, and lets them go.
+    Found(u8, u64),
     /// About to leave the gate with this unit.
     AtGate(u8, Then),
-    /// Leaves counts that it owes these pairs (a seeded bug only).
+    /// Counts these pairs late (seeded bugs only).
     CountingLate(u64, Then),
     /// Takes the frame's opening off all units' countdowns, from this one on.
     Opening(u8, Then),
@@ -151,7 +153,7 @@ pub struct Worker {
     pub queued: u8,
     /// The same of renderings.
     pub renders: u8,
-    /// Pairs that are not counted yet (a seeded bug only).
+    /// Pairs that it found before it arrived, and has not counted yet; when it has arrived, in seeded bugs only.
     pub uncounted: u64,
 }
 
@@ -312,12 +314,15 @@ impl State {
             At::Updating(unit) => 1_u64 << unit,
             _ => 0,
         };
+        let ends = |pair| config.ends(pair).fold(0_u64, |bits, end| bits | 1 << end);
         let reads = |worker: &Worker| match worker.at {
             At::Entering(unit) => {
-                let ends = self.due(config, unit).flat_map(|pair| config.ends(pair));
-                ends.fold(1_u64 << unit, |bits, end| bits | 1 << end)
+                self.due(config, unit).fold(1 << unit, |bits, pair| bits | ends(pair))
             }
-            At::Interacting(pair) => config.ends(pair).fold(0, |bits, end| bits | 1 << end),
+            At::Arriving(_, left) if self.arrived >> left.trailing_zeros() & 1 == 1 => {
+                ends(left.trailing_zeros() as u8)
+            }
+            At::Interacting(pair) => ends(pair),
             At::Rendering(unit) => 1 << unit,
             _ => 0,
         };

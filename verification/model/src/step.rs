@@ -27,8 +27,6 @@ pub enum Act {
         pair: u8,
         /// Whether it is a candidate.
         near: bool,
-        /// Carry.
-        carry: bool,
     },
     /// The callback that it is in returns.
     Call {
@@ -58,10 +56,7 @@ pub(crate) struct Step<'c> {
 impl<'c> Step<'c> {
     /// The state after worker `number` has done `act`, which must be possible.
     pub(crate) fn made(config: &'c Config, state: &State, number: usize, act: Act) -> State {
-        let carry = matches!(
-            act,
-            Act::Test { carry: true, .. } | Act::Call { carry: true } | Act::Go { carry: true }
-        );
+        let carry = matches!(act, Act::Call { carry: true } | Act::Go { carry: true });
         let mut step = Self { config, state: state.clone(), number, carry };
         match act {
             Act::Join => step.worker().at = At::Awake,
@@ -71,7 +66,7 @@ impl<'c> Step<'c> {
             Act::Share => step.share(),
             Act::Turn => step.turn(),
             Act::Take(work) => step.take(work),
-            Act::Test { pair, near, .. } => step.test(pair, near),
+            Act::Test { pair, near } => step.test(pair, near),
             Act::Call { .. } => step.call(),
             Act::Go { .. } => step.go(),
             Act::Ring { woken } => step.ring(woken),

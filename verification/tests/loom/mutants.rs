@@ -1,5 +1,5 @@
-//! Each model is able to fail: every memory order of the core that is not Relaxed is weakened by
-//! one step, alone, and some model must notice. A fence is weakened to none as well.
+//! Each order is noticed: every memory order of the core that is not Relaxed is weakened by one step, alone, and
+//! some model must fail. A fence is weakened to none as well.
 
 use crate::models::hunt::{Kill, each, kill};
 use crate::models::{

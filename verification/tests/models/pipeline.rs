@@ -207,8 +207,10 @@ const ANY: &[Overlap] = &[AfterSwap, BeforeSwap, BeforeRender];
 
 /// Four frames: the pools of contacts and candidates, sized for two, serve twice.
 fn pools_come_round() {
-    let setup = Setup { frames: 4, ..Setup::default() };
-    two_workers("pipeline::pools_come_round", setup, (1, 3, 34), ANY);
+    for broad_phase in [BroadPhase::Spatial, BroadPhase::Pairwise] {
+        let setup = Setup { frames: 4, broad_phase, ..Setup::default() };
+        two_workers("pipeline::pools_come_round", setup, (1, 3, 34), ANY);
+    }
 }
 
 /// Both workers hold a token: two render at once, one swaps, no one renders ahead.

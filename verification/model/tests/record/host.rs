@@ -152,7 +152,7 @@ impl Body {
     }
 }
 
-/// What a token owns: how many frames it has seen swapped.
+/// What a token owns: nothing, since the record says who rendered what.
 #[derive(Debug, Default)]
 pub(crate) struct Screen;
 
