@@ -299,9 +299,10 @@ fn scenery_and_bone_ignore_hands() {
 }
 
 /// A burr in a hand that presses it from above on the middle of the piece.
-fn pressed_by_a_burr(volume: Volume, others: Vec<Object>) -> SerialExecutor {
+fn pressed_by_a_burr(volume: Volume, loose: bool, others: Vec<Object>) -> SerialExecutor {
     let place = volume.center() + Vec3::Z * 2.5e-3;
-    let piece = Piece::new(&volume).loose();
+    let piece = Piece::new(&volume);
+    let piece = if loose { piece.loose() } else { piece };
     let piece = Object::new(ObjectId(0), Group(0), Geometry::Volume(volume), piece);
     let sample = DeviceSample { buttons: 1, ..DeviceSample::at(place) };
     let workpieces = Workpieces { pieces: vec![ObjectId(0)], ..Workpieces::default() };
@@ -322,7 +323,7 @@ fn pressed_by_a_burr(volume: Volume, others: Vec<Object>) -> SerialExecutor {
 #[test]
 fn yields_to_a_bit_and_is_not_shot_away() {
     let pose = Pose::from_translation(Vec3::new(0.0, 0.0, 0.5));
-    let mut executor = pressed_by_a_burr(flap(pose), vec![]);
+    let mut executor = pressed_by_a_burr(flap(pose), true, vec![]);
     let mut fastest = 0.0_f32;
     for frame in 0..30 {
         run(&mut executor, 1);
@@ -333,10 +334,28 @@ fn yields_to_a_bit_and_is_not_shot_away() {
     assert!((0.01..0.2).contains(&fastest), "{fastest} m/s");
 }
 
+/// While it lay in its place it bore the whole of the hand.
+#[test]
+fn is_not_shot_away_when_it_is_pulled_from_its_place() {
+    let pose = Pose::from_translation(Vec3::new(0.0, 0.0, 0.5));
+    let mut executor = pressed_by_a_burr(flap(pose), false, vec![]);
+    run(&mut executor, 30);
+    let point = center(&executor);
+    assert!(look(&executor, |piece, _| piece.is_seated() && piece.removed() > 0));
+    post(&executor, Grasp { by: TOOL, point, radius: 3e-3, stiffness: 1e3, strength: 20.0 });
+    post(&executor, Hold { by: TOOL, position: point + Vec3::X * 4e-3 });
+    for _ in 0..10 {
+        run(&mut executor, 1);
+        let speed = look(&executor, |piece, _| piece.body().velocity.length());
+        assert!(speed < 0.5, "{speed} m/s");
+    }
+    assert!(look(&executor, |piece, _| !piece.is_seated()));
+}
+
 #[test]
 fn is_not_pressed_into_bone_by_a_bit_that_drills_it() {
     let pose = Pose::from_translation(Vec3::new(0.0, 0.0, -SPACING));
-    let mut executor = pressed_by_a_burr(flap(pose), vec![floor()]);
+    let mut executor = pressed_by_a_burr(flap(pose), true, vec![floor()]);
     for frame in 0..60 {
         run(&mut executor, 1);
         assert!(lowest(&executor) > -5e-4, "{} m in frame {frame}", lowest(&executor));
@@ -368,6 +387,28 @@ fn what_is_left_turns_on_as_fast() {
     // The air slows it by 1/s.
     let expected = (1.0 + TIME).powi(-30);
     assert!((kept / expected - 1.0).abs() < 0.01, "{kept}, not {expected}");
+}
+
+/// Its new middle goes on as that place of it did.
+#[test]
+fn what_is_left_goes_on_as_fast() {
+    let volume = flap(Pose::from_parts(Vec3::Z, turned()));
+    let piece = Piece::new(&volume).loose().spinning(turned() * Vec3::Z * 4e-7);
+    let (before, spin) = (volume.center(), piece.body().angular_velocity(&volume));
+    let object = Object::new(ObjectId(0), Group(0), Geometry::Volume(volume), piece);
+    let mut executor = serial(Scene::new(vec![object], stages(0.0)));
+    let aside = before + turned() * Vec3::X * 8e-3;
+    let burr = Burr { bit: Bit::BURR, center: aside, axis: Vec3::Z, spin: 3e3, side: None };
+    post(&executor, Erode { burr, load: 1e3 });
+    run(&mut executor, 1);
+    let velocity = look(&executor, |piece, _| piece.body().velocity);
+    let shift = center(&executor) - before - velocity * TIME;
+    assert!(shift.length() > 1e-4, "{shift}");
+    let expected = spin.cross(shift);
+    assert!(
+        (velocity - expected).length() < 0.01 * expected.length(),
+        "{velocity}, not {expected}"
+    );
 }
 
 #[test]

@@ -4,8 +4,8 @@ use glam::Vec3;
 
 use super::Burr;
 
-/// How far back the way of a bit is remembered, in its radii; usually 2: no wall in which the two sides are
-/// both felt is thicker than the bit.
+/// How far back the way of a bit is remembered, in its radii, along the normal and across it; usually 2: no wall in
+/// which the two sides are both felt is thicker than the bit.
 const MEMORY: f32 = 2.0;
 
 /// The side of the bone that a bit touched in the frame before.
@@ -40,10 +40,12 @@ impl Approach {
     /// Notes which way the bone pushed a bit: of unit length, none where nothing touched it.
     pub fn follow(&mut self, burr: &Burr, normal: Option<Vec3>) {
         self.entry = normal.map(|normal| {
-            let place = self.entry.map_or(burr.center, |entry| entry.place);
-            let way = (burr.center - place).clamp_length_max(MEMORY * burr.bit.radius);
-            let out = way.dot(normal).max(0.0);
-            Entry { normal, place: burr.center - way + normal * out }
+            let reach = MEMORY * burr.bit.radius;
+            let way = burr.center - self.entry.map_or(burr.center, |entry| entry.place);
+            let out = way.dot(normal);
+            // Each by itself: a bit that slides along a wall stays as deep in it.
+            let across = (way - normal * out).clamp_length_max(reach);
+            Entry { normal, place: burr.center - across - normal * out.clamp(-reach, 0.0) }
         });
     }
 

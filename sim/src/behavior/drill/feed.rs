@@ -43,7 +43,8 @@ impl Coupling {
 /// the force that is left over, divided by a resistance. So there is no stiff loop, and a frame of 1/60 s
 /// will do: a bit settles without overshoot as long as the resistance, in N·s/m, is more than the time step
 /// times the stiffness of contact and hand. Where these are stiffer, the resistance is that product: a step
-/// of Newton's method towards the place where the forces are equal.
+/// of Newton's method towards the place where the forces are equal. Between walls that are nearer to each other than a
+/// bit is wide, its contacts are stiffer than they tell, and it trembles by some tenths of a millimetre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Feed {
     strength: f32,

@@ -13,7 +13,8 @@ pub struct Reaction {
     pub elastic: Vec3,
     /// The axial load on the bit's tip: that which the bone under the tip would bear alone.
     pub tip: f32,
-    /// What `elastic` grows by as the bit goes deeper, in newtons per metre, along the bone's outward normals.
+    /// What `elastic` grows by as the bit goes deeper, in newtons per metre, along the bone's outward normals: as
+    /// in a flat half-space, and so too little where a ball has bone on two sides.
     pub stiffness: Vec3,
 }
 

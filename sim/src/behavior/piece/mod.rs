@@ -148,6 +148,7 @@ impl Behavior for Piece {
         if self.erosions.apply(volume, input.frame, time) > 0 {
             self.body.weigh(volume);
         }
+        let was_seated = self.seated;
         if self.seated {
             self.seated = self.hands.force(volume).length() <= SEAT_FORCE;
         } else {
@@ -163,8 +164,9 @@ impl Behavior for Piece {
             let [along, around] = DAMPING.map(|rate| 1.0 / (1.0 + rate * time));
             self.body.velocity = self.body.velocity * along + input.gravity * time;
             self.body.angular_momentum *= around;
-            let whole = input.contacts().filter(|contact| contact.node == Contact::BODY);
-            for contact in whole {
+            // One that lay in its place was pressed as what does not move.
+            let is_pressed = |contact: &Contact| !was_seated && contact.node == Contact::BODY;
+            for contact in input.contacts().filter(is_pressed) {
                 self.body.push(Vec3::from_array(contact.impulse), Vec3::ZERO);
             }
             self.hands.pull(&mut self.body, volume, time);
