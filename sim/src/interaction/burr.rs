@@ -160,6 +160,9 @@ mod tests {
         let expected = Bit::BURR.elastic_force(1e-3);
         assert!((felt.load() / expected - 1.0).abs() < 0.1, "{felt:?}");
         assert!(felt.normal().expect("it touches").z > 0.999);
+        let [less, more] = [0.99e-3, 1.01e-3].map(|depth| Bit::BURR.elastic_force(depth));
+        let expected = (more - less) / 2e-5;
+        assert!((felt.normal_stiffness() / expected - 1.0).abs() < 0.05, "{felt:?}");
         // The lowest point of a bit that turns about +x moves to +y, and is dragged back.
         let drag = felt.force - felt.elastic;
         assert!((drag.y + FRICTION * felt.load()).abs() < 1e-3, "{drag}");
