@@ -17,7 +17,7 @@ use crate::executor::MAX_THREADS;
 /// costs to put a thread to sleep and to wake it again.
 const SPIN: Duration = Duration::from_micros(50);
 
-/// The number of cores that this process may use.
+/// The number of cores that this process may use, as the system counts them: each hardware thread is one.
 #[must_use]
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, NonZero::get)
@@ -25,7 +25,7 @@ pub fn cores() -> usize {
 
 /// How many workers a pipeline has. It may be changed at any time, from any thread: workers beyond
 /// the number leave after the work unit in hand, further ones join within
-/// [`crate::blocking::FRAMES_PER_BLOCKING`] frames.
+/// [`crate::blocking::FRAMES_PER_BLOCKING`] frames, and more of them than ever before get blocks of their own.
 #[derive(Debug)]
 pub struct Pool {
     threads: AtomicUsize,

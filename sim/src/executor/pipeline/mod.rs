@@ -8,6 +8,7 @@
 
 mod clock;
 mod host;
+mod layout;
 mod memory;
 mod overflow;
 mod run;
@@ -19,21 +20,20 @@ use std::time::{Duration, Instant};
 
 use dualframe_core::error::TableFull;
 use dualframe_core::inbox::From;
-use dualframe_core::pipeline::{BroadPhase, Config, MOST_HOMES, Pipeline};
+use dualframe_core::pipeline::{BroadPhase, Config, Pipeline};
 
 pub use dualframe_core::frame::Entry;
 
 use self::clock::Times;
-use self::host::{Parcel, Register, Screen, Shared};
-use self::memory::{Tables, modelled_interactions, spare_interactions};
+use self::host::{Parcel, Screen, Shared};
+use self::layout::Layout;
 use self::overflow::Overflow;
 use self::run::{Context, End, Regrouping, Report};
 use self::team::Team;
 use super::outside::Outside;
 use super::{Executor, ExecutorError, FrameRecord, OnFrame, StageSeconds, world};
-use crate::behavior::Room;
 use crate::block::Block;
-use crate::blocking::{Blocking, Grain};
+use crate::blocking::Grain;
 use crate::cost::Cost;
 use crate::mailbox::Mailbox;
 use crate::message::Letter;
@@ -52,12 +52,8 @@ const MOST_FRAMES: u64 = 1 << 31;
 /// ([`Grain::Pairwise`]): then the calling thread does.
 pub struct PipelineExecutor {
     stages: Stages,
-    blocks: Vec<Block>,
-    blocking: Blocking,
-    tables: Tables,
-    register: Register,
-    room: Room,
-    config: Config,
+    layout: Layout,
+    entry: Entry,
     grain: Grain,
     pool: Arc<Pool>,
     team: Team,
@@ -73,7 +69,8 @@ pub struct PipelineExecutor {
 }
 
 impl PipelineExecutor {
-    /// An executor of `scene` on the threads of `pool`, which may be resized at any time.
+    /// An executor of `scene` on the threads of `pool`, which may be resized at any time: for more threads than
+    /// blocks were formed for they are formed anew.
     ///
     /// # Errors
     /// More objects than the grain allows, numbers of objects that are not 0, 1, 2 … without gaps, or threads that
@@ -85,35 +82,18 @@ impl PipelineExecutor {
         pool: Arc<Pool>,
     ) -> Result<Self, ExecutorError> {
         let Scene { objects, stages, frame, mail: under_way, mailbox } = scene;
-        let (mut blocking, mut blocks) = Blocking::new(objects, grain, pool.threads())?;
         let mut team = Team::default();
         team.grow(pool.threads())?;
-        // As many as there are threads now; whoever joins later shares one.
-        let homes = pool.threads().min(MOST_HOMES);
-        if grain == Grain::Spatial {
-            blocks.iter_mut().for_each(|block| blocking.drain(block));
-            blocking.deal(homes as u32, 0.0);
-            for (index, block) in blocks.iter_mut().enumerate() {
-                blocking.fill(index, block);
-            }
-        }
-        let (broad_phase, interactions) = match grain {
-            Grain::Spatial => (BroadPhase::Spatial, spare_interactions(&blocks)),
-            Grain::Pairwise => (BroadPhase::Pairwise, modelled_interactions(&stages, &blocks)),
-        };
+        let layout = Layout::new(objects, &stages, grain, pool.threads())?;
         let mut mail = Vec::new();
         let outside = Outside::new(mailbox, under_way, frame, |from, to, message| {
             let from = From { sender: from.0, sequence: mail.len() as u32 };
             mail.push((from, Parcel { to, message }));
         });
         Ok(Self {
-            tables: Tables::new(&blocks, interactions, homes),
-            register: Register::new(&blocks),
-            room: Room::of(blocks.iter()),
             stages,
-            blocks,
-            blocking,
-            config: Config { broad_phase, entry, tokens: 1, homes: homes as u32 },
+            layout,
+            entry,
             grain,
             pool,
             team,
@@ -135,22 +115,28 @@ impl PipelineExecutor {
         renderer: &mut dyn Renderer,
         on_frame: &mut OnFrame<'_>,
     ) -> Result<End, ExecutorError> {
-        let limits = self.tables.limits(self.blocks.len());
+        let Layout { blocks, blocking, tables, register, room, homes, .. } = &mut self.layout;
+        let limits = tables.limits(blocks.len());
         let overflow = Overflow::default();
         let shared = Shared {
             stages: &self.stages,
             outside: &self.outside,
-            register: &self.register,
+            register,
             overflow: &overflow,
             first_frame: self.frame,
-            room: self.room,
+            room: *room,
         };
-        self.tables.load(&mut self.blocks);
+        let broad_phase = match self.grain {
+            Grain::Spatial => BroadPhase::Spatial,
+            Grain::Pairwise => BroadPhase::Pairwise,
+        };
+        let config = Config { broad_phase, entry: self.entry, tokens: 1, homes: *homes };
+        tables.load(blocks);
         let crew = Crew::default();
-        let pipeline = match Pipeline::new(self.tables.lend(), self.config, &crew) {
+        let pipeline = match Pipeline::new(tables.lend(), config, &crew) {
             Ok(pipeline) => pipeline,
             Err(error) => {
-                self.tables.unload(&mut self.blocks);
+                tables.unload(blocks);
                 return Err(error.into());
             }
         };
@@ -166,9 +152,9 @@ impl PipelineExecutor {
             timeline: self.timeline.as_deref(),
         };
         let regrouping = Regrouping {
-            blocking: (self.grain == Grain::Spatial).then_some(&mut self.blocking),
+            blocking: (self.grain == Grain::Spatial).then_some(blocking),
             mail: &mut self.mail,
-            homes: self.config.homes,
+            homes: *homes,
             limits,
         };
         let screen = Screen {
@@ -181,7 +167,7 @@ impl PipelineExecutor {
         };
         let ended = context.run(frames, pipeline, regrouping, screen);
         let report = report.into_inner().unwrap_or_else(PoisonError::into_inner);
-        self.tables.unload(&mut self.blocks);
+        tables.unload(blocks);
         (self.times, self.failure) = (report.times, report.failure);
         let end = ended.unwrap_or_else(|panic| resume_unwind(panic));
         self.failure.map_or(Ok(end), |full| Err(full.into()))
@@ -210,15 +196,16 @@ impl Executor for PipelineExecutor {
         }
         self.outside.begin(self.frame);
         while self.frame < end {
-            if self.blocks.is_empty() {
+            if self.layout.blocks.is_empty() {
                 self.swap_nothing(renderer, on_frame);
                 continue;
             }
             let workers = self.pool.threads();
             self.team.grow(workers)?;
+            self.layout.suit(workers, &self.stages, self.grain)?;
             let frames = (end - self.frame).min(MOST_FRAMES);
             if let End::Outgrown(table, to) = self.run(workers, frames, renderer, on_frame)? {
-                self.tables.grow(table, to, self.blocks.len());
+                self.layout.grow(table, to);
             }
         }
         Ok(())
@@ -229,7 +216,7 @@ impl Executor for PipelineExecutor {
     }
 
     fn visit(&self, visit: &mut dyn FnMut(&Object)) {
-        self.blocks.iter().flat_map(Block::objects).for_each(visit);
+        self.layout.blocks.iter().flat_map(Block::objects).for_each(visit);
     }
 
     fn mailbox(&self) -> &Mailbox {
@@ -238,8 +225,7 @@ impl Executor for PipelineExecutor {
 
     fn change(&mut self, change: &mut dyn FnMut(&mut Stages)) {
         if world::changes_pairs(&mut self.stages, change) && self.grain == Grain::Pairwise {
-            let interactions = modelled_interactions(&self.stages, &self.blocks);
-            self.tables.model(interactions, self.blocks.len());
+            self.layout.model(&self.stages);
         }
     }
 
@@ -252,7 +238,7 @@ impl Executor for PipelineExecutor {
             from: ObjectId(from.sender),
             message,
         });
-        let objects = self.blocks.into_iter().flat_map(|block| block.objects);
+        let objects = self.layout.blocks.into_iter().flat_map(|block| block.objects);
         world::scene(objects, self.stages, due, mail, &self.outside)
     }
 
@@ -268,6 +254,7 @@ impl Executor for PipelineExecutor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::executor::state_hash;
     use crate::render::NullRenderer;
     use crate::scene::ParticleScene;
 
@@ -288,7 +275,7 @@ mod tests {
             let mut executor = executor(ParticleScene::new(200).build().expect("a valid scene"), 1);
             (0..runs).for_each(|_| advance(&mut executor, frames));
             let numbers = |block: &Block| block.objects().iter().map(Object::id).collect();
-            let mut blocks: Vec<_> = executor.blocks.iter().map(numbers).collect();
+            let mut blocks: Vec<_> = executor.layout.blocks.iter().map(numbers).collect();
             // The longest come first.
             blocks.sort_unstable();
             blocks
@@ -300,6 +287,24 @@ mod tests {
     }
 
     #[test]
+    fn more_threads_get_as_many_blocks_and_homes_as_if_they_had_been_there() {
+        let scene = || ParticleScene::new(300).build().expect("a valid scene");
+        let sizes =
+            |executor: &PipelineExecutor| (executor.layout.blocks.len(), executor.layout.homes);
+        let (mut grown, mut large) = (executor(scene(), 1), executor(scene(), 8));
+        advance(&mut grown, 40);
+        assert_eq!((sizes(&grown).1, sizes(&large).1), (1, 8));
+        grown.pool.resize(8);
+        advance(&mut grown, 40);
+        assert_eq!(sizes(&grown), sizes(&large));
+        grown.pool.resize(2);
+        advance(&mut grown, 40);
+        assert_eq!(sizes(&grown), sizes(&large), "they may come back");
+        advance(&mut large, 120);
+        assert_eq!(state_hash(&grown), state_hash(&large));
+    }
+
+    #[test]
     fn tables_grow_after_one_frame() {
         let mut scene = ParticleScene::new(60).build().expect("a valid scene");
         let first = scene.objects[0].geometry.as_mesh().expect("a particle").positions.clone();
@@ -308,8 +313,8 @@ mod tests {
             object.refit();
         }
         let mut executor = executor(scene, 2);
-        let before = executor.tables.contact_capacity();
+        let before = executor.layout.tables.contact_capacity();
         advance(&mut executor, 1);
-        assert_eq!(executor.tables.contact_capacity(), 2 * before);
+        assert_eq!(executor.layout.tables.contact_capacity(), 2 * before);
     }
 }

@@ -1,0 +1,110 @@
+//! Blocks for a number of workers, and what is made to their measure.
+
+use dualframe_core::error::Table;
+use dualframe_core::pipeline::MOST_HOMES;
+
+use super::host::Register;
+use super::memory::{Tables, modelled_interactions, spare_interactions};
+use crate::behavior::Room;
+use crate::block::Block;
+use crate::blocking::{Blocking, BlockingError, Grain};
+use crate::object::Object;
+use crate::stages::Stages;
+
+/// The blocks, and all that is as many, or as large, as they ask for.
+pub(super) struct Layout {
+    pub(super) blocks: Vec<Block>,
+    pub(super) blocking: Blocking,
+    pub(super) tables: Tables,
+    pub(super) register: Register,
+    pub(super) room: Room,
+    pub(super) homes: u32,
+    /// The number of workers that all this is for.
+    workers: usize,
+}
+
+impl Layout {
+    /// Of these objects, for so many workers.
+    ///
+    /// # Errors
+    /// More objects than the grain allows, or numbers of objects that are not 0, 1, 2 … without gaps.
+    pub(super) fn new(
+        objects: Vec<Object>,
+        stages: &Stages,
+        grain: Grain,
+        workers: usize,
+    ) -> Result<Self, BlockingError> {
+        let (mut blocking, mut blocks) = Blocking::new(objects, grain, workers)?;
+        let homes = homes(workers);
+        let interactions = match grain {
+            Grain::Spatial => {
+                blocks.iter_mut().for_each(|block| blocking.drain(block));
+                blocking.deal(homes, 0.0);
+                for (index, block) in blocks.iter_mut().enumerate() {
+                    blocking.fill(index, block);
+                }
+                spare_interactions(&blocks)
+            }
+            Grain::Pairwise => modelled_interactions(stages, &blocks),
+        };
+        Ok(Self {
+            tables: Tables::new(&blocks, interactions, homes as usize),
+            register: Register::new(&blocks),
+            room: Room::of(blocks.iter()),
+            blocks,
+            blocking,
+            homes,
+            workers,
+        })
+    }
+
+    /// Forms more blocks and homes if there are more workers than they are for; fewer work on as many as there are.
+    ///
+    /// # Errors
+    /// None but those with which it would not have been made.
+    pub(super) fn suit(
+        &mut self,
+        workers: usize,
+        stages: &Stages,
+        grain: Grain,
+    ) -> Result<(), BlockingError> {
+        if workers > self.workers {
+            let blocks = self.blocks.drain(..);
+            let objects = blocks.flat_map(|block| block.objects).collect();
+            *self = Self::new(objects, stages, grain, workers)?;
+        }
+        Ok(())
+    }
+
+    /// Gives a table more room, for so much.
+    pub(super) fn grow(&mut self, table: Table, needed: usize) {
+        self.tables.grow(table, needed, self.blocks.len());
+    }
+
+    /// Models the interactions anew, of which rules have changed.
+    pub(super) fn model(&mut self, stages: &Stages) {
+        let interactions = modelled_interactions(stages, &self.blocks);
+        self.tables.model(interactions, self.blocks.len());
+    }
+}
+
+/// The homes of so many workers: one for each, or, of more than there can be homes, for as many workers in every home.
+fn homes(workers: usize) -> u32 {
+    workers.div_ceil(workers.div_ceil(MOST_HOMES)) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn homes_have_as_many_workers_each() {
+        for workers in 1..=256 {
+            let homes = homes(workers) as usize;
+            assert!(homes <= MOST_HOMES && homes >= workers.min(MOST_HOMES / 2), "{workers}");
+            let most = workers.div_ceil(homes);
+            // All but the last ones: at most so many are short of one.
+            assert!(most * homes - workers < most, "{workers} workers, {homes} homes");
+        }
+    }
+}
