@@ -26,7 +26,7 @@ use crate::simd::Simd;
 pub struct PairCount {
     /// Pairs of objects with a rule whose boxes and spheres overlap.
     pub candidates: u64,
-    /// Those of them that touched.
+    /// Those of them whose detection found something: touches, or links that are not at rest.
     pub collisions: u64,
 }
 
@@ -193,8 +193,10 @@ impl Stages {
             post,
         };
         let mut waits = false;
+        let mut changed = !object.is_fixed();
         let done = catch_unwind(AssertUnwindSafe(|| {
             for message in mail {
+                changed = true;
                 // What has been taken out stays out.
                 if object.quarantined().is_none() {
                     object.process(message, frame);
@@ -214,7 +216,7 @@ impl Stages {
             // Its springs are advanced with those of others, and then it is refreshed.
         } else if began.is_some_and(|(began, budget)| began.elapsed() > budget) {
             object.quarantine(Fault { kind: FaultKind::OverBudget, frame });
-        } else if object.quarantined().is_none() {
+        } else if object.quarantined().is_none() && (changed || !object.is_finite()) {
             object.refresh(frame, self.simd);
         }
     }

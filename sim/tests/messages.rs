@@ -4,7 +4,7 @@ mod common;
 
 use std::sync::{Arc, Mutex};
 
-use common::{Acting, executors, no_rules, particles, point, run, serial};
+use common::{Acting, EXECUTORS, executor, executors, no_rules, particles, point, run, serial};
 use dualframe_sim::behavior::{Fixed, Input, Keyframe, Scripted};
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::Executor;
@@ -75,10 +75,9 @@ fn next_frame_by_sender_and_sequence_before_the_update() {
     expected.extend((2..4).map(|frame| (ObjectId(RECEIVER), frame, u32::MAX, 0)));
     for grain in [Grain::Spatial, Grain::Pairwise] {
         for threads in 1..=3 {
-            for index in 0..executors(|| gossip(&Log::default()), grain, 1).len() {
+            for index in 0..EXECUTORS {
                 let log = Log::default();
-                let (name, mut executor) =
-                    executors(|| gossip(&log), grain, threads).swap_remove(index);
+                let (name, mut executor) = executor(index, gossip(&log), grain, threads);
                 run(&mut *executor, 2);
                 let note = Note { log: Arc::clone(&log), posted: 99, from: 99, number: 99 };
                 executor.mailbox().post(ObjectId(RECEIVER), Message::Custom(Box::new(note)));
@@ -239,6 +238,36 @@ fn scenery_that_is_given_a_behavior_moves() {
         run(&mut *executor, REGROUPED);
         let falls = [0, 1, 2].map(|id| velocity(&*executor, id).y < -1.0);
         assert_eq!(falls, [true, true, false], "{name}");
+    }
+}
+
+/// Puts the receiver elsewhere.
+#[derive(Debug)]
+struct MoveTo(Vec3);
+
+impl Custom for MoveTo {
+    fn process(&self, object: &mut Object) {
+        let mesh = object.geometry.as_mesh_mut().expect("a point is a mesh");
+        mesh.positions.set(0, self.0);
+    }
+}
+
+#[test]
+fn scenery_is_where_a_message_puts_it_and_out_if_that_is_nowhere() {
+    let scene = || Scene::new((0..3).map(|id| point(id, Fixed)).collect(), no_rules());
+    for (name, mut executor) in executors(scene, Grain::Spatial, 2) {
+        for (to, place) in [(0, Vec3::X), (1, Vec3::NAN)] {
+            let message = Message::Custom(Box::new(MoveTo(place)));
+            executor.mailbox().post(ObjectId(to), message);
+        }
+        run(&mut *executor, 5);
+        let mut places = [(Vec3::NAN, false); 3];
+        executor.visit(&mut |object| {
+            let place = (object.center(), object.quarantined().is_some());
+            places[object.id().0 as usize] = place;
+        });
+        assert_eq!([places[0], places[2]], [(Vec3::X, false), (Vec3::ZERO, false)], "{name}");
+        assert!(places[1].1, "{name}");
     }
 }
 

@@ -58,13 +58,15 @@ const USUAL_PER_WORKER: usize = 4;
 /// Objects of a block that leave few of its lanes empty, however uneven they are; usually 70, a few more than twice as
 /// many as are advanced side by side.
 const FILLING: usize = 70;
+/// The share of scenery's whole extent from which on a part of it reaches far; a quarter.
+const FAR: f32 = 0.25;
 /// How much larger than others the blocks of a home may usually be that is to have more objects; twice.
 const UNEVENNESS: usize = 2;
 
 /// Groups objects into a number of blocks that stays the same; which objects are together changes.
 ///
-/// Scenery and solitary objects have blocks of their own: the boxes of walls would make any block
-/// overlap every other. To regroup, every block is drained, the positions are split, and every block
+/// Scenery and solitary objects have blocks of their own, and of scenery what reaches far: the boxes of walls would make
+/// any block overlap every other. To regroup, every block is drained, the positions are split, and every block
 /// is filled again.
 pub struct Blocking {
     objects: Vec<Option<Object>>,
@@ -123,24 +125,23 @@ impl Blocking {
             kinds[kind(object)].push(object.id().0);
         }
         let [moving, scenery, solitary] = kinds;
-        let (moving_blocks, scenery_blocks, solitary_blocks) = match grain {
-            Grain::Pairwise => (moving.len(), scenery.len(), solitary.len()),
-            Grain::Spatial => (
-                block_count(moving.len(), workers),
-                scenery.len().min(1),
-                block_count(solitary.len(), workers),
-            ),
+        let count = |objects: usize| match grain {
+            Grain::Pairwise => objects,
+            Grain::Spatial => block_count(objects, workers),
+        };
+        let (moving_blocks, solitary_blocks) = (count(moving.len()), count(solitary.len()));
+        let scenery = match grain {
+            Grain::Pairwise => scenery.into_iter().map(|id| Members::of(vec![id])).collect(),
+            Grain::Spatial => group_scenery(&objects, scenery, workers),
         };
         let share = if moving_blocks == moving.len() { 1 } else { HALF };
         let room = UNEVENNESS * moving.len().div_ceil(share).div_ceil(moving_blocks.max(1)) * share;
         let empty = || Members::of(Vec::with_capacity(room));
         let mut members = Vec::new();
         members.resize_with(moving_blocks, empty);
-        for (ids, blocks) in [(scenery, scenery_blocks), (solitary, solitary_blocks)] {
-            let size = ids.len().div_ceil(blocks.max(1)).max(1);
-            let chunks = ids.chunks(size);
-            members.extend(chunks.map(|ids| Members::of(ids.to_vec())));
-        }
+        members.extend(scenery);
+        let size = solitary.len().div_ceil(solitary_blocks.max(1)).max(1);
+        members.extend(solitary.chunks(size).map(|ids| Members::of(ids.to_vec())));
         let mut blocks = Vec::new();
         blocks.resize_with(members.len(), Block::default);
         let keys = Vec::with_capacity(moving.len());
@@ -219,6 +220,28 @@ fn kind(object: &Object) -> usize {
     }
 }
 
+/// Who of the scenery is together: what reaches far, as walls do, and, where it is much, what of the rest is close.
+fn group_scenery(objects: &[Option<Object>], ids: Vec<u32>, workers: usize) -> Vec<Members> {
+    let object = |id: u32| objects.get(id as usize)?.as_ref();
+    let keys = |ids: &[u32]| -> Vec<Key> {
+        ids.iter().filter_map(|&id| object(id)).map(Key::new).collect()
+    };
+    let far = FAR * split::span(&keys(&ids));
+    let reaches_far = |&id: &u32| {
+        let sides = object(id).map(|object| object.bounds().max - object.bounds().min);
+        // Compared so that a side of no meaning is long, too.
+        !sides.is_some_and(|sides| sides.max_element() <= far)
+    };
+    let (walls, rest): (Vec<u32>, Vec<u32>) = ids.into_iter().partition(reaches_far);
+    let mut members = Vec::new();
+    let blocks = if rest.len() <= SINGLE_OBJECTS { 1 } else { block_count(rest.len(), workers) };
+    members.resize_with(blocks, || Members::of(Vec::new()));
+    split::evenly(&mut keys(&rest), &mut members, 0, HALF);
+    members.push(Members::of(walls));
+    members.retain(|members| !members.ids.is_empty());
+    members
+}
+
 /// The number of blocks for so many objects. None is for fewer of them than are advanced side by side, which
 /// would take as long.
 fn block_count(objects: usize, workers: usize) -> usize {
@@ -238,9 +261,15 @@ fn block_count(objects: usize, workers: usize) -> usize {
 mod tests {
     use std::time::Duration;
 
+    use glam::Vec3;
+    use parry3d::math::Pose;
+    use parry3d::shape::SharedShape;
     use proptest::prelude::*;
 
     use super::*;
+    use crate::behavior::Fixed;
+    use crate::geometry::{Geometry, Rigid};
+    use crate::object::{Group, ObjectId};
     use crate::scene::ParticleScene;
 
     /// Deals particles whose updates take so many microseconds, for two workers; for each home what its blocks' updates
@@ -284,6 +313,39 @@ mod tests {
                 assert_eq!(halves.count(), 0, "a long one after a short one: {home:?}");
             }
             assert_eq!(given.iter().map(Vec::len).sum::<usize>(), micros.len());
+        }
+    }
+
+    /// A field of stones in a room, and the blocks that it makes.
+    fn scenery(stones: usize, workers: usize) -> Vec<Vec<ObjectId>> {
+        let wall = Rigid::wall(Vec3::ZERO, Vec3::Y);
+        let stone = |index: usize| {
+            let place = Vec3::new((index % 50) as f32, 0.0, (index / 50) as f32);
+            let mut stone = wall.clone();
+            (stone.shape, stone.pose) = (SharedShape::ball(0.2), Pose::from_translation(place));
+            stone
+        };
+        let parts = std::iter::once(wall.clone()).chain((0..stones).map(stone)).enumerate();
+        let object =
+            |(id, part)| Object::new(ObjectId(id as u32), Group(0), Geometry::Rigid(part), Fixed);
+        let grouped = Blocking::new(parts.map(object).collect(), Grain::Spatial, workers);
+        let (_, blocks) = grouped.expect("numbered without gaps");
+        blocks.iter().map(|block| block.objects().iter().map(Object::id).collect()).collect()
+    }
+
+    #[test]
+    fn much_scenery_is_grouped_by_place_and_walls_apart() {
+        for (stones, blocks) in [(0, 1), (SINGLE_OBJECTS, 2), (2_500, 1 + 18)] {
+            let grouped = scenery(stones, 2);
+            assert_eq!(grouped.len(), blocks, "{stones}");
+            assert_eq!(grouped.last(), Some(&vec![ObjectId(0)]), "{stones}");
+            assert_eq!(grouped.iter().map(Vec::len).sum::<usize>(), stones + 1);
+        }
+        for block in scenery(2_500, 2) {
+            let column = |id: &ObjectId| (id.0.max(1) - 1) % 50;
+            let columns = block.iter().map(column);
+            let (least, most) = (columns.clone().min(), columns.max());
+            assert!(most.zip(least).is_some_and(|(most, least)| most - least < 30), "{block:?}");
         }
     }
 

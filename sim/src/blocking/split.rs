@@ -137,15 +137,24 @@ fn part_at(keys: &mut [Key], count: usize, axis: usize) -> (&mut [Key], &mut [Ke
 /// else be split another way each time, and go from one core's caches to another's.
 const NOTABLY: f32 = 1.25;
 
-/// The axis along which they extend notably farther than along those before it.
-fn longest_side(keys: &[Key]) -> usize {
-    let side = |axis: usize| {
+/// How far they extend along each axis.
+fn sides(keys: &[Key]) -> [f32; 3] {
+    [0, 1, 2].map(|axis: usize| {
         let values = keys.iter().map(|key| key.center[axis]);
         let (low, high) = values
             .fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), value| (l.min(value), h.max(value)));
         high - low
-    };
-    let sides = [side(0), side(1), side(2)];
+    })
+}
+
+/// How far they extend along the longest side; 0 for none.
+pub(super) fn span(keys: &[Key]) -> f32 {
+    sides(keys).into_iter().fold(0.0, f32::max)
+}
+
+/// The axis along which they extend notably farther than along those before it.
+fn longest_side(keys: &[Key]) -> usize {
+    let sides = sides(keys);
     let longer =
         |longest, axis| if sides[axis] > NOTABLY * sides[longest] { axis } else { longest };
     (1..3).fold(0, longer)

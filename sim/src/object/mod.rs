@@ -137,6 +137,11 @@ impl Object {
         self.extent.center
     }
 
+    /// Whether its geometry was finite after its last update, or where an executor took over its scene.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.extent.finite
+    }
+
     /// What an update takes, in seconds, as its share of its block's last ones that were timed; 0 before
     /// the first.
     #[must_use]
