@@ -4,7 +4,7 @@ mod common;
 
 use std::sync::{Arc, Mutex};
 
-use common::{Acting, executors, no_rules, particles, point, run, serial};
+use common::{Acting, EXECUTORS, executor, executors, no_rules, particles, point, run, serial};
 use dualframe_sim::behavior::Input;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::{
@@ -176,10 +176,9 @@ fn two_frames_after_the_swap_and_at_the_beginning_of_a_run() {
         for threads in 1..=3 {
             for length in [1, 2, 7, 40] {
                 let runs: Vec<u64> = (0..40).step_by(length).collect();
-                for index in 0..7 {
+                for index in 0..EXECUTORS {
                     let log = Log::default();
-                    let (name, mut executor) =
-                        executors(|| diary(&log), grain, threads).swap_remove(index);
+                    let (name, mut executor) = executor(index, diary(&log), grain, threads);
                     let mailbox = executor.mailbox().clone();
                     let tell = |number| mailbox.post(ObjectId(0), note(&log, Event::Told(number)));
                     for &first in &runs {
@@ -204,9 +203,9 @@ fn two_frames_after_the_swap_and_at_the_beginning_of_a_run() {
 #[test]
 fn nothing_from_another_thread_is_lost() {
     const NOTES: u64 = 20_000;
-    for index in 0..7 {
+    for index in 0..EXECUTORS {
         let log = Log::default();
-        let (name, mut executor) = executors(|| diary(&log), Grain::Spatial, 2).swap_remove(index);
+        let (name, mut executor) = executor(index, diary(&log), Grain::Spatial, 2);
         let mailbox = executor.mailbox().clone();
         std::thread::scope(|scope| {
             let teller = scope.spawn(|| {

@@ -106,7 +106,7 @@ fn results_are_the_same() {
     let scene = || particles(100, true, true);
     let alone = executors(scene, Grain::Spatial, THREADS);
     let watched = executors(scene, Grain::Spatial, THREADS);
-    for ((name, mut alone), (_, mut watched)) in alone.into_iter().zip(watched) {
+    for ((name, mut alone), (_, mut watched)) in alone.zip(watched) {
         watched.watch(Arc::new(Timeline::new(1, 10)));
         let ((counts, hash, _), (same_counts, same_hash, _)) =
             (run(&mut *alone, FRAMES), run(&mut *watched, FRAMES));

@@ -40,7 +40,7 @@ fn no_allocation() {
     assert_eq!(allocations(), before);
 
     let scene = || particles(60, true, true);
-    for (name, mut executor) in executors(scene, Grain::Spatial, 2).into_iter().take(4) {
+    for (name, mut executor) in executors(scene, Grain::Spatial, 2).take(4) {
         let timeline = Arc::new(Timeline::new(2, SPANS));
         executor.watch(Arc::clone(&timeline));
         let (warm, end) = (AtomicUsize::new(0), AtomicUsize::new(0));

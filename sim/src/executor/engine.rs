@@ -90,7 +90,7 @@ impl Engine {
             bounds: Vec::with_capacity(blocks),
             found: (0..blocks).map(|_| world::found_list()).collect(),
             candidates: Candidates::new(blocks),
-            outcomes: (0..world::first_outcomes(blocks)).map(|_| Outcome::new()).collect(),
+            outcomes: world::first_outcomes(blocks, grain),
             world,
         })
     }
@@ -119,11 +119,7 @@ impl Engine {
         let (bounds, workers, frame) = (&self.bounds, &self.workers, self.frame);
         let begin = |worker: usize| workers[worker].clock.time(Stage::BroadPhase, frame);
         loops.for_each(&mut self.found, begin, |_timer, first, found| {
-            let may_touch = |second: usize| {
-                let (first, second) = world::pair(blocks, [first as u32, second as u32]);
-                world::may_touch(stages, first, second)
-            };
-            partners.find(first, bounds, may_touch, found);
+            partners.find(first, stages, bounds, |index| &blocks[index], found);
         });
         self.candidates.clear();
         for (first, found) in self.found.iter().enumerate() {
@@ -135,7 +131,7 @@ impl Engine {
         let World { stages, blocks, .. } = &self.world;
         let pairs = &self.candidates.pairs;
         if self.outcomes.len() < pairs.len() {
-            self.outcomes.resize_with(pairs.len(), Outcome::new);
+            self.outcomes.resize_with(pairs.len(), Outcome::default);
         }
         let (workers, frame) = (&self.workers, self.frame);
         let outcomes = &mut self.outcomes[..pairs.len()];

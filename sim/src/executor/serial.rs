@@ -45,7 +45,7 @@ impl SerialExecutor {
             bounds: Vec::with_capacity(blocks),
             found: world::found_list(),
             candidates: Candidates::new(blocks),
-            outcomes: (0..world::first_outcomes(blocks)).map(|_| Outcome::new()).collect(),
+            outcomes: world::first_outcomes(blocks, grain),
             outbox: world::outbox(blocks),
             scratch: Scratch::new(),
             workspace: Workspace::with_room(Room::of(world.blocks.iter())),
@@ -63,11 +63,8 @@ impl SerialExecutor {
         self.bounds.extend(blocks.iter().map(Block::bounds));
         self.candidates.clear();
         for first in 0..blocks.len() {
-            let may_touch = |second: usize| {
-                let (first, second) = world::pair(blocks, [first as u32, second as u32]);
-                world::may_touch(stages, first, second)
-            };
-            partners.find(first, &self.bounds, may_touch, &mut self.found);
+            let block = |index: usize| &blocks[index];
+            partners.find(first, stages, &self.bounds, block, &mut self.found);
             self.candidates.extend(first, &self.found);
         }
     }
@@ -76,7 +73,7 @@ impl SerialExecutor {
         let _timer = self.clock.time(Stage::Interaction, self.frame);
         let pairs = &self.candidates.pairs;
         if self.outcomes.len() < pairs.len() {
-            self.outcomes.resize_with(pairs.len(), Outcome::new);
+            self.outcomes.resize_with(pairs.len(), Outcome::default);
         }
         let mut count = PairCount::default();
         for (&pair, outcome) in pairs.iter().zip(&mut self.outcomes) {

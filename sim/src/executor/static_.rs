@@ -92,10 +92,7 @@ impl StaticExecutor {
             mail: world.mail,
         };
         let room = Room::of(world.blocks.iter());
-        let outcomes = || {
-            let first = world::first_outcomes(count).div_ceil(threads);
-            RwLock::new((0..first).map(|_| Outcome::new()).collect())
-        };
+        let outcomes = || RwLock::new(world::first_outcomes(count.div_ceil(threads), grain));
         let shared = Arc::new(Shared {
             blocks: world.blocks.into_iter().map(RwLock::new).collect(),
             found: (0..count).map(|_| Mutex::new(world::found_list())).collect(),
@@ -204,12 +201,9 @@ impl Shared {
         let _timer = self.time(worker, Stage::BroadPhase);
         let plan = read(&self.plan);
         for first in self.share(worker, self.blocks.len()) {
-            let own = read(&self.blocks[first]);
-            let may_touch = |other: usize| {
-                let second = (other != first).then(|| read(&self.blocks[other]));
-                world::may_touch(&plan.stages, &own, second.as_deref())
-            };
-            plan.partners.find(first, &plan.bounds, may_touch, &mut lock(&self.found[first]));
+            let block = |index: usize| read(&self.blocks[index]);
+            let found = &mut lock(&self.found[first]);
+            plan.partners.find(first, &plan.stages, &plan.bounds, block, found);
         }
     }
 
@@ -228,7 +222,7 @@ impl Shared {
         let pairs = &plan.candidates.pairs[self.share(worker, plan.candidates.pairs.len())];
         let mut outcomes = write(&self.outcomes[worker]);
         if outcomes.len() < pairs.len() {
-            outcomes.resize_with(pairs.len(), Outcome::new);
+            outcomes.resize_with(pairs.len(), Outcome::default);
         }
         for (&[first, second], outcome) in pairs.iter().zip(&mut *outcomes) {
             let other = (first != second).then(|| read(&self.blocks[second as usize]));

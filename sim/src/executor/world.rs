@@ -16,8 +16,9 @@ use crate::object::{Object, ObjectId};
 use crate::scene::Scene;
 use crate::stages::{PairCount, Stages};
 
-/// Records that a candidate's buffer holds before it has to grow.
+/// Records that a candidate's buffer holds before it has to grow, of two blocks and of two single objects.
 const RECORDS_PER_CANDIDATE: usize = 512;
+const RECORDS_PER_PAIR: usize = 128;
 /// Candidates with a buffer from the start, for each block: itself and its neighbours in a grid, of
 /// which each pair counts once, and some walls.
 const CANDIDATES_PER_BLOCK: usize = 16;
@@ -133,20 +134,24 @@ impl Partners {
         Self((0..blocks).map(of).collect())
     }
 
-    /// Finds the partners of block `first` that may interact with it. `may_touch` looks at the blocks
-    /// themselves; it is asked only where their boxes overlap.
-    pub(super) fn find(
+    /// Finds the partners of block `first`, itself among them, whose objects may touch its own. `block` is asked for
+    /// blocks only where their boxes overlap.
+    pub(super) fn find<B: Deref<Target = Block>>(
         &self,
         first: usize,
+        stages: &Stages,
         bounds: &[Bounds],
-        mut may_touch: impl FnMut(usize) -> bool,
+        block: impl Fn(usize) -> B,
         found: &mut Vec<u32>,
     ) {
         found.clear();
-        let own = bounds[first];
+        let (own, around) = (block(first), bounds[first]);
         let partners = self.0[first].iter().copied();
-        let close = partners.filter(|&other| own.overlaps(&bounds[other as usize]));
-        found.extend(close.filter(|&other| may_touch(other as usize)));
+        let close = partners.filter(|&other| around.overlaps(&bounds[other as usize]));
+        found.extend(close.filter(|&other| match other as usize {
+            other if other == first => stages.interacts_within(&own),
+            other => stages.broad_phase(&own, &block(other)),
+        }));
     }
 }
 
@@ -199,26 +204,14 @@ pub(super) fn pair(blocks: &[Block], [first, second]: [u32; 2]) -> (&Block, Opti
     (&blocks[first as usize], (first != second).then(|| &blocks[second as usize]))
 }
 
-/// Whether objects of two blocks, or of one if they are the same, may touch.
-pub(super) fn may_touch(stages: &Stages, first: &Block, second: Option<&Block>) -> bool {
-    match second {
-        Some(second) => stages.broad_phase(first, second),
-        None => stages.interacts_within(first),
-    }
-}
-
 /// The results of one candidate.
+#[derive(Default)]
 pub(super) struct Outcome {
     contacts: ContactBuffer,
     pub(super) pairs: PairCount,
 }
 
 impl Outcome {
-    pub(super) fn new() -> Self {
-        let contacts = ContactBuffer::with_capacity(RECORDS_PER_CANDIDATE);
-        Self { contacts, pairs: PairCount::default() }
-    }
-
     /// Interacts two blocks, or one with itself if there is no second.
     pub(super) fn compute(
         &mut self,
@@ -239,9 +232,15 @@ impl Outcome {
     }
 }
 
-/// The number of outcomes to begin with.
-pub(super) fn first_outcomes(blocks: usize) -> usize {
-    CANDIDATES_PER_BLOCK * blocks
+/// Outcomes to begin with, for so many blocks, with room for what candidates usually give.
+pub(super) fn first_outcomes(blocks: usize, grain: Grain) -> Vec<Outcome> {
+    let records = match grain {
+        Grain::Spatial => RECORDS_PER_CANDIDATE,
+        Grain::Pairwise => RECORDS_PER_PAIR,
+    };
+    let contacts = || ContactBuffer::with_capacity(records);
+    let outcome = |_| Outcome { contacts: contacts(), pairs: PairCount::default() };
+    (0..CANDIDATES_PER_BLOCK * blocks).map(outcome).collect()
 }
 
 /// What the objects of a block sent in a frame, as (from, to, message).

@@ -33,37 +33,57 @@ pub(crate) fn particles(objects: usize, gravity: bool, damping: bool) -> Scene {
     scene.build().expect("the number of particles is allowed")
 }
 
-/// Every executor for a scene, with a name.
+/// How many executors there are.
+pub(crate) const EXECUTORS: usize = if cfg!(feature = "native-peers") { 11 } else { 7 };
+
+/// Every executor for a scene, with a name, one after the other.
 pub(crate) fn executors(
     scene: impl Fn() -> Scene,
     grain: Grain,
     threads: usize,
-) -> Vec<(&'static str, Box<dyn Executor>)> {
+) -> impl Iterator<Item = (&'static str, Box<dyn Executor>)> {
+    (0..EXECUTORS).map(move |number| executor(number, scene(), grain, threads))
+}
+
+/// One of [`EXECUTORS`] for a scene, with its name.
+pub(crate) fn executor(
+    number: usize,
+    scene: Scene,
+    grain: Grain,
+    threads: usize,
+) -> (&'static str, Box<dyn Executor>) {
     let ok = "the scene and the number of threads are allowed";
-    let pipeline = |entry| {
+    let pipeline = |scene, entry| {
         let pool = Arc::new(Pool::new(threads, false));
-        Box::new(PipelineExecutor::new(scene(), grain, entry, pool).expect(ok))
+        Box::new(PipelineExecutor::new(scene, grain, entry, pool).expect(ok))
     };
-    vec![
-        ("pipeline", pipeline(Entry::AfterUpdate)),
-        ("pipeline, render first", pipeline(Entry::AfterRender)),
-        ("pipeline, one frame", pipeline(Entry::AfterSwap)),
-        ("serial", Box::new(SerialExecutor::new(scene(), grain).expect(ok))),
-        ("static", Box::new(StaticExecutor::new(scene(), grain, threads).expect(ok))),
-        ("rayon", Box::new(RayonExecutor::new(scene(), grain, threads).expect(ok))),
-        ("overlapped", Box::new(RayonOverlappedExecutor::new(scene(), grain, threads).expect(ok))),
+    match number {
+        0 => ("pipeline", pipeline(scene, Entry::AfterUpdate)),
+        1 => ("pipeline, render first", pipeline(scene, Entry::AfterRender)),
+        2 => ("pipeline, one frame", pipeline(scene, Entry::AfterSwap)),
+        3 => ("serial", Box::new(SerialExecutor::new(scene, grain).expect(ok))),
+        4 => ("static", Box::new(StaticExecutor::new(scene, grain, threads).expect(ok))),
+        5 => ("rayon", Box::new(RayonExecutor::new(scene, grain, threads).expect(ok))),
+        6 => {
+            ("overlapped", Box::new(RayonOverlappedExecutor::new(scene, grain, threads).expect(ok)))
+        }
         #[cfg(feature = "native-peers")]
-        ("openmp static", Box::new(OpenMpStaticExecutor::new(scene(), grain, threads).expect(ok))),
+        7 => {
+            ("openmp static", Box::new(OpenMpStaticExecutor::new(scene, grain, threads).expect(ok)))
+        }
         #[cfg(feature = "native-peers")]
-        (
+        8 => (
             "openmp dynamic",
-            Box::new(OpenMpDynamicExecutor::new(scene(), grain, threads).expect(ok)),
+            Box::new(OpenMpDynamicExecutor::new(scene, grain, threads).expect(ok)),
         ),
         #[cfg(feature = "native-peers")]
-        ("tbb for", Box::new(TbbForExecutor::new(scene(), grain, threads).expect(ok))),
+        9 => ("tbb for", Box::new(TbbForExecutor::new(scene, grain, threads).expect(ok))),
         #[cfg(feature = "native-peers")]
-        ("tbb pipeline", Box::new(TbbPipelineExecutor::new(scene(), grain, threads).expect(ok))),
-    ]
+        10 => {
+            ("tbb pipeline", Box::new(TbbPipelineExecutor::new(scene, grain, threads).expect(ok)))
+        }
+        _ => panic!("there are {EXECUTORS} executors"),
+    }
 }
 
 /// Advances an executor; the counts of its frames, its state and what was drawn.

@@ -63,7 +63,7 @@ impl TbbPipelineExecutor {
             arena: Tbb::new(threads)?,
             workers: (0..threads).map(|_| Worker::new(&world.blocks)).collect(),
             bounds: Vec::with_capacity(blocks),
-            searches: (0..blocks).map(|_| Search::new()).collect(),
+            searches: (0..blocks).map(|_| Search::new(grain)).collect(),
             candidates: Candidates::new(blocks),
             first_places: Vec::with_capacity(blocks),
             running: Running::new(),
@@ -133,28 +133,22 @@ impl TbbPipelineExecutor {
 }
 
 impl Search {
-    fn new() -> Self {
-        let outcomes = (0..world::first_outcomes(1)).map(|_| Outcome::new()).collect();
-        Self { found: world::found_list(), outcomes }
+    fn new(grain: Grain) -> Self {
+        Self { found: world::found_list(), outcomes: world::first_outcomes(1, grain) }
     }
 
     /// Finds the partners of block `first`, and lets it interact with them.
     fn run(&mut self, world: &World, bounds: &[Bounds], first: usize, worker: &Worker, frame: u64) {
         let World { stages, blocks, partners, .. } = world;
-        let pair = |second: usize| world::pair(blocks, [first as u32, second as u32]);
         let timer = worker.clock.time(Stage::BroadPhase, frame);
-        let may_touch = |second| {
-            let (first, second) = pair(second);
-            world::may_touch(stages, first, second)
-        };
-        partners.find(first, bounds, may_touch, &mut self.found);
+        partners.find(first, stages, bounds, |index| &blocks[index], &mut self.found);
         drop(timer);
         if self.outcomes.len() < self.found.len() {
-            self.outcomes.resize_with(self.found.len(), Outcome::new);
+            self.outcomes.resize_with(self.found.len(), Outcome::default);
         }
         let (_timer, mut scratch) = worker.begin_interaction(frame);
         for (&second, outcome) in self.found.iter().zip(&mut self.outcomes) {
-            let (first, second) = pair(second as usize);
+            let (first, second) = world::pair(blocks, [first as u32, second]);
             outcome.compute(stages, first, second, &mut scratch);
         }
     }
