@@ -8,6 +8,7 @@ use std::cell::Cell;
 use std::process::ExitCode;
 use std::time::Instant;
 
+use dualframe_sim::blocking::FRAMES_PER_BLOCKING;
 use dualframe_sim::experiment::calibrator::Calibrator;
 use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::race::Runner;
@@ -32,7 +33,9 @@ fn density(arguments: &common::Arguments) -> Result<(), ExperimentError> {
         let counts: Vec<Cell<Count>> = sizes.iter().map(|_| Cell::default()).collect();
         let mut contenders = Vec::new();
         for (&objects, count) in sizes.iter().zip(&counts) {
+            // As many regroupings in each run, of however many objects.
             let frames = arguments.frames_for(objects, 40_000);
+            let frames = frames.next_multiple_of(FRAMES_PER_BLOCKING);
             let filling = if arguments.test { 3 } else { FILLING };
             contenders.push(environment(runner, objects, filling, frames, count)?);
         }

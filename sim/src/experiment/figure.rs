@@ -73,19 +73,24 @@ impl Chart {
         self.draw(plots, highest)
     }
 
-    /// Draws a group of bars for each label; `series` names the bars of a group.
+    /// Draws a group of bars for each label; `series` names the bars of a group, which have no colours of their own
+    /// where these would not tell them apart.
     pub(super) fn bars(
         self,
         series: &[String],
         groups: Vec<(String, Vec<f64>)>,
     ) -> Result<Figure, ExperimentError> {
         let highest = groups.iter().flat_map(|(_, bars)| bars).copied().fold(0.0, f64::max);
+        let are_few = series.len() <= COLORS.len();
+        let color = |place: usize| COLORS[if are_few { place } else { 0 }];
         let mut plot = BarPlot::new();
         for (label, bars) in groups {
-            let colors = COLORS.into_iter().cycle();
-            plot = plot.with_group(label, bars.into_iter().zip(colors));
+            let bars = bars.into_iter().enumerate().map(|(place, bar)| (bar, color(place)));
+            plot = plot.with_group(label, bars.collect::<Vec<_>>());
         }
-        let plot = plot.with_legend(series.iter().map(String::as_str).collect());
+        if are_few {
+            plot = plot.with_legend(series.iter().map(String::as_str).collect());
+        }
         self.draw(vec![plot.into()], highest)
     }
 
@@ -138,6 +143,23 @@ mod tests {
         assert_eq!(drawn(6), [1, 2, 3, 4, 5, 6]);
         assert_eq!(drawn(12), [1, 2, 4, 8, 12]);
         assert_eq!(drawn(64), [1, 2, 4, 8, 16, 32, 64]);
+    }
+
+    #[test]
+    fn bars_have_colors_of_their_own_or_one() {
+        let figure = |workers: usize| {
+            let names: Vec<String> =
+                (0..workers).map(|worker| format!("worker {worker}")).collect();
+            let groups = vec![("5".to_owned(), vec![1.0; workers])];
+            Chart::default().bars(&names, groups).expect("bars are drawn").svg
+        };
+        let colors = |svg: &str| COLORS[1..].iter().filter(|color| svg.contains(**color)).count();
+        let [few, many] = [COLORS.len(), COLORS.len() + 1].map(figure);
+        assert!(
+            colors(&few) >= COLORS.len() - 2 && few.contains("worker 6"),
+            "black is the text's too"
+        );
+        assert!(colors(&many) <= 1 && many.contains(COLORS[0]) && !many.contains("worker"));
     }
 
     #[test]

@@ -187,8 +187,8 @@ fn figure(balances: &[Balance], frames: u64) -> Result<Figure, ExperimentError> 
         x_label: "objects",
         y_label: "seconds",
         finding: format!(
-            "The busiest and the idlest worker differ by at most {:.1} %. Of each size one run is shown, {USUAL}; \
-             stages have the shares that they have in one frame of 31. {}",
+            "The busiest and the idlest worker differ by at most {:.1} %. Of each size one run is shown, {USUAL}, the \
+             workers from left to right; stages have the shares that they have in one frame of 31. {}",
             100.0 * greatest,
             marked(balances)
         ),

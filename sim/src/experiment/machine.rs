@@ -1,6 +1,7 @@
 //! What an experiment ran on.
 
-use std::fmt;
+use std::collections::HashSet;
+use std::{fmt, fs};
 
 use crate::pool::cores;
 use crate::simd::Simd;
@@ -10,8 +11,10 @@ use crate::simd::Simd;
 pub struct Machine {
     /// The processor's name.
     pub processor: String,
-    /// The cores that this process may use.
-    pub cores: usize,
+    /// The hardware threads that this process may use, a worker each.
+    pub threads: usize,
+    /// The machine's cores, where the system says: of one core two hardware threads get less done than two cores.
+    pub cores: Option<usize>,
     /// The operating system.
     pub system: &'static str,
     /// The instruction set that the program was built for.
@@ -26,7 +29,8 @@ impl Machine {
     pub fn this() -> Self {
         Self {
             processor: processor().unwrap_or_else(|| "unknown processor".to_owned()),
-            cores: cores(),
+            threads: cores(),
+            cores: physical_cores(),
             system: std::env::consts::OS,
             architecture: std::env::consts::ARCH,
             instructions: Simd::detect().instructions().name(),
@@ -36,18 +40,33 @@ impl Machine {
 
 impl fmt::Display for Machine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { processor, cores, system, architecture, instructions } = self;
-        let plural = if *cores == 1 { "" } else { "s" };
-        write!(
-            f,
-            "{processor}, {cores} core{plural}, {system} {architecture}, kernels {instructions}"
-        )
+        let Self { processor, threads, cores, system, architecture, instructions } = self;
+        let plural = |count: usize| if count == 1 { "" } else { "s" };
+        write!(f, "{processor}, ")?;
+        match *cores {
+            Some(cores) if cores == *threads => write!(f, "{cores} core{}", plural(cores))?,
+            Some(cores) => {
+                let plurals = [plural(*threads), plural(cores)];
+                write!(f, "{threads} hardware thread{} of {cores} core{}", plurals[0], plurals[1])?;
+            }
+            None => write!(f, "{threads} hardware thread{}", plural(*threads))?,
+        }
+        write!(f, ", {system} {architecture}, kernels {instructions}")
     }
+}
+
+/// How many cores Linux says that there are: hardware threads that name different siblings. Other systems are not asked.
+fn physical_cores() -> Option<usize> {
+    let threads = fs::read_dir("/sys/devices/system/cpu").ok()?.flatten();
+    let siblings = threads.map(|thread| thread.path().join("topology/thread_siblings_list"));
+    let cores: HashSet<String> =
+        siblings.filter_map(|list| fs::read_to_string(list).ok()).collect();
+    (!cores.is_empty()).then_some(cores.len())
 }
 
 /// What Linux says of the processor; other systems are not asked.
 fn processor() -> Option<String> {
-    let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
+    let text = fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = text.lines().find(|line| line.starts_with("model name"))?;
     let (_, name) = line.split_once(':')?;
     Some(name.trim().to_owned())
@@ -60,7 +79,20 @@ mod tests {
     #[test]
     fn it_has_a_core() {
         let machine = Machine::this();
-        assert!(machine.cores >= 1);
+        assert!(machine.threads >= 1 && machine.cores != Some(0));
         assert!(machine.to_string().contains(machine.architecture));
+    }
+
+    #[test]
+    fn cores_and_hardware_threads_are_told_apart() {
+        let told = |threads, cores| Machine { threads, cores, ..Machine::this() }.to_string();
+        for (threads, cores, expected) in [
+            (1, Some(1), " 1 core, "),
+            (8, Some(8), " 8 cores, "),
+            (8, Some(4), " 8 hardware threads of 4 cores, "),
+            (1, None, " 1 hardware thread, "),
+        ] {
+            assert!(told(threads, cores).contains(expected), "{expected}");
+        }
     }
 }
