@@ -46,7 +46,8 @@ pub struct SettingsError {
 
 impl ForceSettings {
     /// The usual settings for a loop at `rate` hertz: forces change as fast as at 1 kHz, and the damping is at most
-    /// half of m/T for a device of m = 0.1 kg. A loop of less than 400 Hz has less of it than bone of 2 kN/m takes.
+    /// half of m/T for a device of m = 0.1 kg. A loop of less than 142 Hz has less of it than
+    /// bone of 2 kN/m takes, K·T/2.
     #[must_use]
     pub fn at(rate: f64) -> Self {
         Self {
@@ -165,14 +166,15 @@ impl ForceLaw {
             self.enter(time, position, model, is_new);
             self.number = number;
         }
-        let mut wanted = self.wanted(time, position);
+        let wanted = self.wanted(time, position);
         let share = self.watchdog.share(time);
         let stored = self.model.energy_at(position) * f64::from(share);
         let resistance = self.passivity.resistance(stored, way, elapsed);
-        wanted.force += resistance;
-        let lags = self.exert(wanted);
-        if lags && share == 1.0 {
-            let shown = Wrench { force: self.wrench.force - resistance, ..self.wrench };
+        let lags = self.exert(Wrench { force: wanted.force + resistance, ..wanted });
+        let shown = Wrench { force: self.wrench.force - resistance, ..self.wrench };
+        // Where the damping alone could not come at once, the model has nothing to catch up on.
+        let is_less = shown.force.length_squared() < wanted.force.length_squared();
+        if lags && is_less && share == 1.0 {
             self.entry = self.entry.again(shown, self.modelled(position), time);
         }
         self.last = Some((time, position));
@@ -315,6 +317,30 @@ mod tests {
         let given = before - law.forces().absorbed;
         let expected = f64::from(blind) / 5.0 * 5e-3;
         assert!((given - expected).abs() < 1e-6 && given > 4e-3, "{given} J, not {expected} J");
+    }
+
+    /// A tool that took more with it than it brought is braked at once, and never pushed on, in free space too.
+    #[test]
+    fn damping_does_not_come_in_like_a_model() {
+        let mut law = law();
+        rest(&mut law, 1, 400);
+        (0..4).for_each(|_| _ = law.step_blind());
+        let step = |law: &mut ForceLaw, tick: u32| {
+            let out = DeviceSample::at(Vec3::Y * (3e-3 + 2e-4 * tick as f32));
+            law.step(0.5 + f64::from(tick) * PERIOD, &out, (400, &WALL)).force.y
+        };
+        let forces: Vec<f32> = (0..100).map(|tick| step(&mut law, tick)).collect();
+        let most = forces.iter().copied().fold(0.0, f32::min);
+        assert!(most < -1.0 && smooth(&forces), "{forces:?}");
+        let falls = forces.iter().position(|&force| force == most).unwrap_or(0);
+        assert!(
+            falls <= 4 + (most.abs() / 0.5).ceil() as usize,
+            "it comes as fast as steps allow: {forces:?}"
+        );
+        assert!(
+            forces[1..].iter().skip_while(|&&force| force > 0.0).all(|&force| force <= 1e-6),
+            "{forces:?}"
+        );
     }
 
     /// A tool that breaks in fast and goes out slowly: the force that could not rise in time must not

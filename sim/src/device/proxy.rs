@@ -4,8 +4,8 @@
 //! for haptic display", IROS 1995, on an implicit surface, as K. Salisbury, C. Tarr, "Haptic rendering
 //! of surfaces defined by implicit functions", ASME 1997: where the tool is outside it is the tool; where
 //! the tool is inside it stays on the surface, at the place nearest to the tool. So the force points out
-//! on the side on which the tool came in, also from a thin wall; only a tool that is in front of the
-//! wall in one frame and behind it in the next was never inside.
+//! on the side on which the tool came in, also from a thin wall, however deep it is at first; only a tool that is in
+//! front of the wall in one frame and behind it in the next was never inside.
 //!
 //! Near the surface the proxy is on it already, and its model holds for the gap: however late the
 //! model comes, the haptic loop knows where contact begins.
@@ -18,6 +18,8 @@ use super::model::{LocalModel, along};
 /// Newton steps onto the surface, and tangential moves, for each time the proxy follows. Usually 8: a tool
 /// that moved 5 mm along a skull of 7 cm radius is followed to 1 µm in 3.
 const STEPS: usize = 8;
+/// Halvings of the way of a tool that came from afar. Usually 16: of 0.1 m to 2 µm.
+const HALVINGS: usize = 16;
 /// The proxy is on the surface within this distance, in metres. Usually 1 µm: 2 mN at 2 kN/m.
 const TOLERANCE: f32 = 1e-6;
 /// How far from the surface a tool may be for a model of the gap, in metres. Usually 0.02: at 0.5 m/s
@@ -104,6 +106,9 @@ impl Proxy {
             }
             return;
         }
+        if self.normal.is_none() {
+            self.enter(tool, surface);
+        }
         for _ in 0..STEPS {
             let before = self.position;
             // Along the surface towards the tool, then back onto it.
@@ -118,6 +123,24 @@ impl Proxy {
             if self.position.distance(before) < TOLERANCE {
                 break;
             }
+        }
+    }
+
+    /// Goes to where the tool came in: the surface near the proxy, or else where that is crossed on the way from there
+    /// to a tool that came from afar, deeper than a gradient is known.
+    fn enter(&mut self, tool: Vec3, surface: &impl Surface) {
+        if self.settle(surface) && self.normal.is_some() {
+            return;
+        }
+        let (mut outer, mut inner) = (self.position, tool);
+        // A proxy deep inside came from nowhere.
+        if surface.distance(outer).0 > 0.0 {
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (outer + inner);
+                if surface.distance(middle).0 > 0.0 { outer = middle } else { inner = middle }
+            }
+            self.position = outer;
+            self.settle(surface);
         }
     }
 
@@ -164,9 +187,11 @@ mod tests {
 
     const RADIUS: f32 = 0.07;
 
-    /// A sphere, a wall of 2 mm in the plane y = 0, or nothing.
+    /// A sphere, one of which no gradient is known deeper than 1.5 mm and farther off than the reach, as of voxels, a
+    /// wall of 2 mm in the plane y = 0, or nothing.
     enum Body {
         Sphere,
+        Voxels,
         Wall,
         Nothing,
     }
@@ -175,6 +200,11 @@ mod tests {
         fn distance(&self, point: Vec3) -> (f32, Vec3) {
             match self {
                 Self::Sphere => (point.length() - RADIUS, point.normalize_or_zero()),
+                Self::Voxels => match Self::Sphere.distance(point) {
+                    (distance, _) if distance < -1.5e-3 => (f32::NEG_INFINITY, Vec3::ZERO),
+                    (distance, _) if distance > REACH => (f32::INFINITY, Vec3::ZERO),
+                    near => near,
+                },
                 Self::Wall => (point.y.abs() - 1e-3, Vec3::Y * point.y.signum()),
                 Self::Nothing => (f32::INFINITY, Vec3::ZERO),
             }
@@ -200,6 +230,24 @@ mod tests {
         proxy.follow(out, &Body::Sphere);
         assert!(!proxy.touches());
         assert_eq!(proxy.position(), out);
+    }
+
+    /// A tool that is deeper than a gradient is known as soon as it is felt is held out where it came in: from the
+    /// tip of a drill that is in bone itself, and from far off between two frames.
+    #[test]
+    fn a_tool_that_is_deep_at_once_is_held_out() {
+        let outward = Vec3::new(0.6, 0.8, 0.0);
+        for from in [-0.6e-3, 1e-3, REACH, 0.05] {
+            for depth in [1e-3, 2.6e-3, 8e-3] {
+                let mut proxy = Proxy::new(outward * (RADIUS + from));
+                proxy.follow(outward * (RADIUS - depth), &Body::Voxels);
+                let off = proxy.position().distance(outward * RADIUS);
+                assert!(proxy.touches() && off < 1e-5, "{off} m off, {depth} m deep from {from}");
+            }
+        }
+        let mut proxy = Proxy::new(Vec3::ZERO);
+        proxy.follow(outward * 0.01, &Body::Voxels);
+        assert_eq!(proxy.normal, None, "it came from nowhere");
     }
 
     /// A tool that was pressed through a thin wall is pushed back to where it came from.

@@ -1,6 +1,7 @@
 //! What a hand feels: a haptic loop's device moves a tool, and what the tool meets comes back as forces.
 
 use std::collections::VecDeque;
+use std::time::{Duration, Instant};
 
 use glam::{Mat3, Vec3};
 
@@ -18,6 +19,9 @@ use crate::object::{Object, ObjectId};
 const TOUCHED: usize = 2;
 /// Likewise where the tool was when that which it holds was drawn there, which has told since.
 const HELD: usize = 3;
+/// How long nothing may be heard of a device before its buttons count as let go of; usually 0.25 s: a drill whose
+/// device was pulled out is not to go on, and a loop of 5 Hz still says enough.
+const LETS_GO: Duration = Duration::from_millis(250);
 /// How far a drill is led beside the device at most, in metres; usually 1 mm.
 const SHIFT: f32 = 0.001;
 /// The stiffness with which the dura is felt, in newtons per metre; usually 200, that of its contact.
@@ -45,6 +49,10 @@ const FRICTION_GIVES: f32 = 0.000_5;
 #[derive(Debug)]
 pub(super) struct Feel<'c> {
     end: SimulationEnd<'c>,
+    /// What the loop said at the last swap.
+    told: Option<ToolState>,
+    /// When it last said where the device is.
+    heard: Instant,
     /// The device at the first look in the frame that is being drawn.
     now: Option<ToolState>,
     /// The device at the last swaps, the last one last.
@@ -89,15 +97,21 @@ impl<'c> Feel<'c> {
         let past = VecDeque::with_capacity(HELD + 2);
         let (now, next, tool, bones, drags) = (None, None, None, Vec::new(), Default::default());
         let (rest, shift, grasp) = (None, None, Vec3::ZERO);
-        Self { end, now, past, next, tool, bones, rest, shift, grasp, drags }
+        let (told, heard) = (None, Instant::now());
+        Self { end, told, heard, now, past, next, tool, bones, rest, shift, grasp, drags }
     }
 
     pub(super) fn into_end(self) -> SimulationEnd<'c> {
         self.end
     }
 
-    /// The device at the last swap; none as long as its loop said nothing.
-    pub(super) fn device(&self) -> Option<&ToolState> {
+    /// What the loop said of its device at the last swap, also that it cannot be read; none as long as it said nothing.
+    pub(super) fn told(&self) -> Option<&ToolState> {
+        self.told.as_ref()
+    }
+
+    /// Where the device was last, at a swap.
+    fn device(&self) -> Option<&ToolState> {
         self.past.back()
     }
 
@@ -157,12 +171,21 @@ impl<'c> Feel<'c> {
 
     /// The frame was swapped: where the device is that the tool follows, from now on.
     pub(super) fn sample(&mut self) -> Option<DeviceSample> {
-        let now = self.said().or(self.device().copied());
-        self.past.extend(now);
+        let (told, last) = (self.end.tool(), self.device().copied());
+        if told.is_fresh || told.fault.is_some() {
+            self.told = Some(told);
+        }
+        if told.is_fresh && last.is_none_or(|last| told.time > last.time) {
+            self.heard = Instant::now();
+        }
+        self.past.extend(told.is_fresh.then_some(told).or(last));
         if self.past.len() > HELD + 1 {
             self.past.pop_front();
         }
         let mut sample = self.device()?.sample;
+        if self.heard.elapsed() > LETS_GO {
+            sample.buttons = 0;
+        }
         match self.tool.map(|tool| tool.push) {
             // A drill finds its own way.
             Some(Some(_)) => sample.position += self.shift.unwrap_or_default(),
@@ -177,15 +200,10 @@ impl<'c> Feel<'c> {
         Some(sample)
     }
 
-    /// The device now, as far as its loop has said anything that counts.
-    fn said(&mut self) -> Option<ToolState> {
-        let now = self.end.tool();
-        now.is_fresh.then_some(now)
-    }
-
-    /// The device in the frame that is being drawn.
+    /// The device in the frame that is being drawn, as far as its loop has said anything that counts.
     fn look(&mut self) -> Option<ToolState> {
-        self.now = self.now.or_else(|| self.said()).or(self.device().copied());
+        let said = || Some(self.end.tool()).filter(|tool| tool.is_fresh);
+        self.now = self.now.or_else(said).or(self.past.back().copied());
         self.now
     }
 
@@ -210,11 +228,10 @@ impl<'c> Feel<'c> {
         let rub = tool.follow(&device, rub, normal);
         let acts = |part: &LocalModel| part.force_at(device.sample.position) != Vec3::ZERO;
         let together = |parts: [_; 3]| parts.into_iter().flatten().filter(acts).reduce(sum);
+        // Bone that is near is told before it is touched, also beside what pulls.
+        let contact = together([Some(bone), rub, dura]).unwrap_or(bone);
         // What only pushes has an end where what pulls has none.
-        Some(match (together([Some(bone), rub, dura]), together([held, cut, None])) {
-            (Some(contact), Some(pull)) => contact.beside(&pull),
-            (contact, pull) => contact.or(pull).unwrap_or(bone),
-        })
+        Some(together([held, cut, None]).map_or(contact, |pull| contact.beside(&pull)))
     }
 
     /// Of bone that a drill is in with its tip.

@@ -1,3 +1,5 @@
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
@@ -200,6 +202,49 @@ fn a_device_that_cannot_be_written_leads_its_tool() {
     assert!(place.distance(to) < 1e-6, "{place}");
 }
 
+/// A device at rest that may be pulled out.
+struct Plugged<'a>(DeviceSample, &'a AtomicBool);
+
+impl HapticDevice for Plugged<'_> {
+    fn description(&self) -> DeviceDescription {
+        SimulatedDevice::DESCRIPTION
+    }
+
+    fn read(&mut self, _time: f64) -> Result<DeviceSample, DeviceError> {
+        if self.1.load(Ordering::Relaxed) { Err(DeviceError::Disconnected) } else { Ok(self.0) }
+    }
+
+    fn write(&mut self, _wrench: Wrench) -> Result<(), DeviceError> {
+        Ok(())
+    }
+}
+
+/// A device that is pulled out with its button down: the simulation knows, and after a while its tool lets go.
+#[test]
+fn a_device_that_is_gone_is_told_of_and_lets_go() {
+    let place = LID + Vec3::Z * 0.02;
+    let mut link = HapticLink::new();
+    let (end, simulation) = link.split();
+    let is_gone = AtomicBool::new(false);
+    let device = Plugged(DeviceSample { buttons: 1, ..DeviceSample::at(place) }, &is_gone);
+    let mut feel = Feel::new(simulation);
+    let mut ticking = HapticLoop::new(device, end, ForceSettings::default());
+    assert_eq!(feel.sample(), None, "nothing was said");
+    assert_eq!(feel.told(), None);
+    ticking.tick(0.1);
+    let pressed = feel.sample().expect("it was said where the device is");
+    assert_eq!((pressed.buttons, feel.told().and_then(|told| told.fault)), (1, None));
+    is_gone.store(true, Ordering::Relaxed);
+    ticking.tick(0.2);
+    assert_eq!(feel.sample(), Some(pressed), "for a tick that is missed nobody lets go");
+    assert_eq!(feel.told().and_then(|told| told.fault), Some(DeviceError::Disconnected));
+    feel.heard -= 2 * LETS_GO;
+    assert_eq!(feel.sample(), Some(DeviceSample { buttons: 0, ..pressed }));
+    is_gone.store(false, Ordering::Relaxed);
+    ticking.tick(0.6);
+    assert_eq!(feel.sample(), Some(pressed), "it is there again");
+}
+
 /// Bone that is drawn no more, since it was removed or hidden, neither pushes a hand nor holds its tool out.
 #[test]
 fn what_is_not_drawn_is_not_felt() {
@@ -230,13 +275,22 @@ fn what_is_not_drawn_is_not_felt() {
     assert_eq!(wrench, Wrench::default());
 }
 
-/// A tool that cuts, 1 mm deep in bone: what it cuts holds it back, but bone does not when it goes out.
+/// A blade that cuts 0.5 mm above bone: the loop knows where that begins.
 #[test]
-fn bone_only_pushes_also_beside_what_is_cut() {
+fn bone_that_is_near_is_told_beside_what_is_cut() {
     let mut link = HapticLink::new();
+    let model = cutting(&mut link, Vec3::Y * 0.5e-3);
+    let cut = |way: f32| CUTTING / CUTTING_GIVES * way;
+    let above = model.force_at(Vec3::Y * 0.5e-3);
+    assert!(above.y.abs() < 1e-3 && above.x > 0.3, "{above}");
+    let inside = model.force_at(Vec3::Y * -1e-3);
+    assert!((inside.y - 2.0 - cut(1.5e-3)).abs() < 1e-3, "{inside}");
+}
+
+/// What is told of a tool there that cuts in a plane of bone, and is held back by 1 mm.
+fn cutting(link: &mut HapticLink, place: Vec3) -> LocalModel {
     let (end, simulation) = link.split();
     let mut feel = Feel::new(simulation);
-    let place = Vec3::Y * -1e-3;
     let device = ScriptedDevice::new(Motion::at_rest(place).expect("finite"));
     HapticLoop::new(device, end, ForceSettings::default()).tick(0.1);
     let mut proxy = Proxy::new(Vec3::Y);
@@ -248,7 +302,15 @@ fn bone_only_pushes_also_beside_what_is_cut() {
     feel.model().expect("a device and a tool");
     let [blade, _] = &mut feel.drags;
     blade.anchor = Some(place + Vec3::X * 1e-3);
-    let model = feel.model().expect("a device and a tool");
+    feel.model().expect("a device and a tool")
+}
+
+/// A tool that cuts, 1 mm deep in bone: what it cuts holds it back, but bone does not when it goes out.
+#[test]
+fn bone_only_pushes_also_beside_what_is_cut() {
+    let mut link = HapticLink::new();
+    let place = Vec3::Y * -1e-3;
+    let model = cutting(&mut link, place);
     let inside = model.force_at(place);
     assert!((inside.y - 2.0).abs() < 1e-3 && inside.x > 0.3, "{inside}");
     let outside = model.force_at(Vec3::Y * 1e-3);
