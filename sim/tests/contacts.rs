@@ -10,8 +10,8 @@ use dualframe_sim::behavior::{Fixed, Keyframe};
 use dualframe_sim::block::Block;
 use dualframe_sim::geometry::{Geometry, Mesh, Rigid, Topology};
 use dualframe_sim::interaction::{
-    Contact, ContactBuffer, Detection, InteractionPair, NodeSpheres, NodesInShape, Penalty,
-    Scratch, Segment,
+    Compliant, Contact, ContactBuffer, Detection, InteractionPair, NodeSpheres, NodesInShape,
+    Penalty, Response, Scratch, Segment,
 };
 use dualframe_sim::object::{Group, Object, ObjectId};
 use dualframe_sim::stages::{PairCount, Stages};
@@ -24,12 +24,30 @@ const SHAPES: Group = Group(1);
 
 /// Stages in which groups interact by the detection, with 100 N/m and 1 s a frame.
 fn stages(first: Group, second: Group, detection: impl Detection + 'static) -> Stages {
+    let response = Penalty::new(100.0, 0.0, 0.0).expect("a stiffness");
+    responding(first, second, detection, response)
+}
+
+/// Stages in which groups interact by the detection and the response, with 1 s a frame.
+fn responding(
+    first: Group,
+    second: Group,
+    detection: impl Detection + 'static,
+    response: impl Response + 'static,
+) -> Stages {
     let mut stages = no_rules();
     stages.time_step = 1.0;
-    let response = Penalty::new(100.0, 0.0, 0.0).expect("a stiffness");
     let pair = InteractionPair { detection: Box::new(detection), response: Box::new(response) };
     stages.rules.model(first, second, pair).expect("the first rule");
     stages
+}
+
+/// Two nodes of 1 kg, 1 m apart along the x axis about the origin.
+fn rod() -> Object {
+    let ends = [Vec3::X * -0.5, Vec3::X * 0.5];
+    let topology = Topology::new(&ends, Vec::new(), &[], false).expect("a topology");
+    let mesh = Mesh::new(Arc::new(topology), &ends, &[1.0; 2], 0.1).expect("a mesh");
+    Object::new(ObjectId(0), POINTS, Geometry::Mesh(mesh), springs(1.0))
 }
 
 /// A point with a contact sphere of 0.1 m.
@@ -87,12 +105,6 @@ fn spheres_push_each_other_apart() {
 #[test]
 fn boxes_and_spheres_may_overlap_without_contact() {
     let stages = stages(POINTS, POINTS, NodeSpheres::default());
-    let rod = || {
-        let ends = [Vec3::X * -0.5, Vec3::X * 0.5];
-        let topology = Topology::new(&ends, Vec::new(), &[], false).expect("a topology");
-        let mesh = Mesh::new(Arc::new(topology), &ends, &[1.0; 2], 0.1).expect("a mesh");
-        Object::new(ObjectId(0), POINTS, Geometry::Mesh(mesh), springs(1.0))
-    };
     let mut counts = Vec::new();
     for place in [Vec3::Y * 0.15, Vec3::new(0.68, 0.15, 0.15), Vec3::X * 0.75] {
         let (segments, count) = interact(&stages, rod(), point_at(1, place));
@@ -109,6 +121,17 @@ fn cores_touch_as_whole_bodies() {
     let (segments, _) = interact(&stages, point_at(0, Vec3::ZERO), point_at(1, Vec3::X * 0.15));
     assert_impulse(&segments[0][0], 0, Contact::BODY, Vec3::X * -1.0);
     assert_impulse(&segments[1][0], 1, Contact::BODY, Vec3::X * 1.0);
+}
+
+/// A rod of 2 kg and a point of 1 kg part by the depth of 10 mm within the frame of 1 s.
+#[test]
+fn cores_are_pushed_apart_by_an_implicit_spring_too() {
+    let response = Compliant::contact(1e9, 0.0).expect("a stiffness");
+    let stages = responding(POINTS, POINTS, NodeSpheres { core_radius: 0.08 }, response);
+    let (segments, _) = interact(&stages, rod(), point_at(1, Vec3::Y * 0.15));
+    let impulse = Vec3::Y * (0.01 / (1.0 / 2.0 + 1.0));
+    assert_impulse(&segments[0][0], 0, Contact::BODY, -impulse);
+    assert_impulse(&segments[1][0], 1, Contact::BODY, impulse);
 }
 
 #[test]

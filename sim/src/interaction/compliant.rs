@@ -10,7 +10,7 @@ use crate::geometry::{Geometry, Mesh};
 use crate::object::Object;
 
 /// A spring and a dashpot along each touch's normal, one implicit step of a frame's length: with masses
-/// m, M of the two nodes, w = 1/m + 1/M, and the rate v at which they part, the impulse is
+/// m, M of the two nodes, or what answers for bodies touched as a whole, w = 1/m + 1/M, and the rate v at which they part, the impulse is
 /// t·(k·d − (k·t + c)·v) / (1 + (k·t² + c·t)·w) for a depth d. So any stiffness is stable for a node that
 /// has one such spring: a very stiff one brings its ends together within the frame, and no further.
 ///
@@ -94,13 +94,29 @@ struct End {
 }
 
 fn end(object: &Object, node: u32) -> End {
-    let held = |velocity: Vec3| End { velocity: velocity.to_array(), inverse_mass: 0.0 };
     match &object.geometry {
         Geometry::Mesh(mesh) if node != Contact::BODY => node_end(mesh, node),
-        Geometry::Mesh(_) => held(Vec3::ZERO),
+        Geometry::Mesh(mesh) => body_end(mesh),
         Geometry::Rigid(rigid) => held(rigid.velocity),
         Geometry::Volume(volume) => held(volume.velocity),
     }
+}
+
+/// A deformable body as a whole: its nodes' mean velocity, which impulses change of which each node has an equal share.
+fn body_end(mesh: &Mesh) -> End {
+    let nodes = mesh.positions.len().max(1) as f32;
+    let all = (0..mesh.positions.len()).map(|node| node_end(mesh, node as u32));
+    let sum = all.fold(held(Vec3::ZERO), |sum, end| End {
+        velocity: std::array::from_fn(|axis| sum.velocity[axis] + end.velocity[axis]),
+        inverse_mass: sum.inverse_mass + end.inverse_mass,
+    });
+    let velocity = sum.velocity.map(|component| component / nodes);
+    End { velocity, inverse_mass: sum.inverse_mass / (nodes * nodes) }
+}
+
+/// What no force moves.
+fn held(velocity: Vec3) -> End {
+    End { velocity: velocity.to_array(), inverse_mass: 0.0 }
 }
 
 fn node_end(mesh: &Mesh, node: u32) -> End {

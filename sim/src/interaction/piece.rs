@@ -166,7 +166,7 @@ impl Motion {
 }
 
 /// A point of the piece that touches bone.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Point {
     /// From the centre of mass, in metres.
     place: Vec3,
@@ -199,7 +199,9 @@ impl Point {
         self.pressed = pressed;
         let velocity = motion.at(self.place);
         let slip = velocity - self.normal * velocity.dot(self.normal);
-        let rubbed = (self.rubbed - slip * self.mass).clamp_length_max(friction * self.pressed);
+        // A piece that stands on its edge turns far more easily than it is pushed down.
+        let mass = motion.mass(self.place, slip.normalize_or_zero());
+        let rubbed = (self.rubbed - slip * mass).clamp_length_max(friction * self.pressed);
         motion.push(rubbed - self.rubbed, self.place);
         self.rubbed = rubbed;
     }
@@ -210,6 +212,24 @@ mod tests {
     use parry3d::math::Pose;
 
     use super::*;
+
+    /// A plate of 60 mm and 20 g that slips while it stands on its edge is held, not kicked: along the bone a quarter
+    /// of the mass answers that does from above.
+    #[test]
+    fn a_plate_on_its_edge_is_held_by_friction() {
+        let (mass, length) = (0.02_f32, 0.06_f32);
+        let inertia = mass * length * length / 12.0;
+        let (velocity, spin) = (Vec3::new(1e-3, -0.04, 0.0), Vec3::ZERO);
+        let inverse_inertia = Mat3::from_diagonal(Vec3::splat(1.0 / inertia));
+        let mut motion = Motion { velocity, spin, inverse_mass: 1.0 / mass, inverse_inertia };
+        let touch = Touch { nodes: [0, Contact::BODY], normal: [0.0, 1.0, 0.0], depth: 0.0 };
+        let mut edge = Point::new(&touch, Vec3::NEG_Y * (0.5 * length), &motion, 1.0 / 60.0);
+        for _ in 0..ROUNDS {
+            edge.push(&mut motion, 0.4);
+        }
+        let left = motion.at(edge.place);
+        assert!(left.length() < 1e-6, "{left} m/s, {edge:?}");
+    }
 
     /// Voxel by voxel it would take minutes.
     #[test]

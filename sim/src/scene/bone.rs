@@ -53,7 +53,7 @@ pub fn bone_piece(side: u32, pose: Pose) -> Result<Volume, VolumeError> {
 
 /// Drills a hole from `entry` (metres) along `direction`, `depth` metres deep at the tip, by a ball of
 /// `radius` metres that is moved on by half a voxel at a time. Returns what was removed; 255 are a full
-/// voxel.
+/// voxel. Without a direction or a depth there is no hole.
 pub fn drill_burr_hole(
     volume: &mut Volume,
     entry: Vec3,
@@ -62,6 +62,9 @@ pub fn drill_burr_hole(
     depth: f32,
 ) -> u64 {
     let direction = direction.normalize_or_zero();
+    if direction == Vec3::ZERO || depth.is_nan() || depth <= 0.0 {
+        return 0;
+    }
     let step = 0.5 * volume.spacing().min_element();
     // No hole is deeper than the volume.
     let steps = (depth.min(volume.extent().length()) / step) as u32;
@@ -168,11 +171,15 @@ mod tests {
         let top = Vec3::new(0.032, 0.032, TOP);
         for (direction, radius, depth) in [
             (Vec3::NEG_Z, 0.01, f32::NEG_INFINITY),
+            (Vec3::NEG_Z, 0.01, 0.0),
+            (Vec3::NEG_Z, 0.01, f32::NAN),
             (Vec3::NAN, 0.01, 0.01),
-            (Vec3::X, f32::NAN, 1.0),
+            (Vec3::ZERO, 0.01, 0.01),
+            (Vec3::NEG_Z, f32::NAN, 1.0),
         ] {
-            assert_eq!(drill_burr_hole(&mut bone, top + Vec3::Z, direction, radius, depth), 0);
+            assert_eq!(drill_burr_hole(&mut bone, top, direction, radius, depth), 0);
         }
         assert_eq!(bone.digest(), before);
+        assert_ne!(drill_burr_hole(&mut bone, top, Vec3::NEG_Z, 0.01, 0.01), 0);
     }
 }

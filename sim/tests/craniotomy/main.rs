@@ -57,8 +57,13 @@ impl Theatre {
             };
             self.manager.run(batch, &mut watch, &mut on_frame).expect("no table is full");
             let settings = self.settings;
-            let look = self.operation.look(self.manager, |scene| VeManager::new(scene, settings));
+            let mut is_another = false;
+            let look = self.operation.look(self.manager, |scene| {
+                is_another = true;
+                VeManager::new(scene, settings)
+            });
             let (manager, freed) = look.expect("few threads");
+            assert_eq!(is_another, freed > 0, "a look alone stops nobody");
             self.manager = manager;
             self.freed.extend(std::iter::repeat_n(self.manager.frame(), freed));
         }

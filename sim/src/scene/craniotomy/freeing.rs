@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::{PIECES, TOOLS};
 use crate::behavior::Tool;
 use crate::behavior::piece::Piece;
-use crate::geometry::{Bounds, Geometry, Volume};
+use crate::geometry::{Bounds, Geometry, Part, Volume};
 use crate::object::{Object, ObjectId};
 use crate::scene::Scene;
 
@@ -23,11 +23,9 @@ pub(super) fn free(scene: &mut Scene, skull: ObjectId, region: &Bounds) -> usize
     if let Some(object) = scene.objects.get_mut(skull.0 as usize)
         && let Some(volume) = object.geometry.as_volume_mut()
     {
-        let least = (LEAST / volume.voxel_volume()) as u64;
-        let parts = volume.parts(voxels(volume, region));
-        let free = parts.iter().filter(|part| !part.touches_border() && part.voxels() >= least);
+        let parts = free_parts(volume, region);
         // A part that cannot be taken out stays where it is.
-        freed.extend(free.filter_map(|part| volume.split_off(part).ok()));
+        freed.extend(parts.iter().filter_map(|part| volume.split_off(part).ok()));
     }
     let color = scene.objects.get(skull.0 as usize).map(|skull| skull.visual);
     let count = freed.len();
@@ -43,6 +41,14 @@ pub(super) fn free(scene: &mut Scene, skull: ObjectId, region: &Bounds) -> usize
         }
     }
     count
+}
+
+/// The parts of bone that are free within `region` (metres) and large enough.
+pub(super) fn free_parts(volume: &Volume, region: &Bounds) -> Vec<Part> {
+    let least = (LEAST / volume.voxel_volume()) as u64;
+    let mut parts = volume.parts(voxels(volume, region));
+    parts.retain(|part| !part.touches_border() && part.voxels() >= least);
+    parts
 }
 
 /// The voxels of a box in the world.

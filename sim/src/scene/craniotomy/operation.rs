@@ -114,7 +114,7 @@ impl<'c> Operation<'c> {
         self.score.report(&self.head.plan.burr_hole, &opening)
     }
 
-    /// Whether bone was drilled since the last look, so that some may be free.
+    /// Whether bone was drilled since the last look, and some is free.
     fn is_due(&mut self, manager: &VeManager) -> bool {
         let mut removed = 0;
         manager.visit(&mut |object| {
@@ -123,7 +123,18 @@ impl<'c> Operation<'c> {
                 removed += bone.removed();
             }
         });
-        std::mem::replace(&mut self.removed, removed) != removed
+        if std::mem::replace(&mut self.removed, removed) == removed {
+            return false;
+        }
+        let mut is_any_free = false;
+        manager.visit(&mut |object| {
+            if object.id() == SKULL
+                && let Some(skull) = object.geometry.as_volume()
+            {
+                is_any_free = !freeing::free_parts(skull, &self.region).is_empty();
+            }
+        });
+        is_any_free
     }
 
     /// Looks for freed bone between two runs, and makes objects of it. Gives the manager back, or another
@@ -167,11 +178,12 @@ impl Hands<'_, '_> {
         }
     }
 
-    /// The device of hand number `hand` (0 or 1) at the last swap, with all that its loop has measured;
+    /// The device of hand number `hand` (0 or 1) at the last swap, with all that its loop has measured, and why it cannot
+    /// be read or written, if it cannot: its tool stays where it was then, and after 0.25 s lets go of its buttons;
     /// none where no loop is linked, or none has said anything yet.
     #[must_use]
     pub fn device(&self, hand: usize) -> Option<ToolState> {
-        lock(self.feels.get(hand)?.as_ref()?).device().copied()
+        lock(self.feels.get(hand)?.as_ref()?).told().copied()
     }
 }
 
