@@ -120,6 +120,7 @@ impl<H: Hand> View<H> {
         let refresh =
             window.current_monitor().and_then(|monitor| monitor.refresh_rate_millihertz());
         let refresh = refresh.map(|rate| f64::from(rate.max(1_000)) * 1e-3);
+        let pace = Pace::new(refresh, shown.time_step, painter.gpu().is_software());
         Ok(Self {
             event_loop: SendWrapper::new(event_loop),
             input,
@@ -136,7 +137,7 @@ impl<H: Hand> View<H> {
             timeline: shown.timeline,
             mailbox: Mailbox::new(),
             is_shown: true,
-            pace: Pace::new(refresh, shown.time_step),
+            pace,
             failure: None,
         })
     }
