@@ -231,9 +231,8 @@ impl Report {
     }
 
     /// Prints the closing table.
-    pub(super) fn print(&self) {
-        // A closed pipe must not turn a sound run into a panic.
-        let _printed = self.table(&mut std::io::stdout().lock());
+    pub(super) fn print(&self) -> Result<(), RunError> {
+        outputs::print(|out| self.table(out))
     }
 
     fn table(&self, out: &mut impl Write) -> std::io::Result<()> {
