@@ -8,6 +8,7 @@ use std::ops::Deref;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
+use dualframe_sim::timeline::Timeline;
 use serde::Serialize;
 
 use super::args::Products;
@@ -55,6 +56,12 @@ impl Outputs {
             check_no_frame(folder, &files)?;
         }
         Ok(outputs)
+    }
+
+    /// Writes what a timeline has, where there are one and a file for it.
+    pub(super) fn write_trace(&self, timeline: Option<&Timeline>) -> Result<(), RunError> {
+        let Some((file, timeline)) = self.trace.as_deref().zip(timeline) else { return Ok(()) };
+        replace(file, |writer| timeline.write_chrome_trace(writer)).map_err(RunError::Trace)
     }
 }
 
