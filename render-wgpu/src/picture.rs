@@ -5,9 +5,8 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use wgpu::{
-    Buffer, BufferDescriptor, BufferUsages, COPY_BYTES_PER_ROW_ALIGNMENT, CommandEncoder, Device,
-    Extent3d, MapMode, PollType, TexelCopyBufferInfo, TexelCopyBufferLayout, Texture,
-    TextureFormat,
+    Buffer, BufferDescriptor, BufferUsages, COPY_BYTES_PER_ROW_ALIGNMENT, Extent3d, MapMode,
+    PollType, TexelCopyBufferInfo, TexelCopyBufferLayout, Texture, TextureFormat,
 };
 
 use crate::error::GraphicsError;
@@ -60,61 +59,34 @@ impl Picture {
 /// The device failed.
 pub fn read_texture(gpu: &Gpu, texture: &Texture) -> Result<Picture, GraphicsError> {
     let Gpu { device, queue, .. } = gpu;
-    let readback = Readback::new(device, texture.width(), texture.height());
+    let (width, height) = (texture.width(), texture.height());
+    let stride = (width * PIXEL).next_multiple_of(COPY_BYTES_PER_ROW_ALIGNMENT);
+    let buffer = device.create_buffer(&BufferDescriptor {
+        label: Some("picture"),
+        size: u64::from(stride) * u64::from(height),
+        usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let layout = TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(stride),
+        rows_per_image: Some(height),
+    };
     let mut encoder = device.create_command_encoder(&Default::default());
-    readback.copy(&mut encoder, texture);
+    encoder.copy_texture_to_buffer(
+        texture.as_image_copy(),
+        TexelCopyBufferInfo { buffer: &buffer, layout },
+        Extent3d { width, height, depth_or_array_layers: 1 },
+    );
     queue.submit([encoder.finish()]);
-    let mut picture = readback.read(gpu)?;
+    let bytes = read_buffer(gpu, &buffer).map_err(|error| gpu.failure().unwrap_or(error))?;
+    let rows = bytes.chunks(stride as usize);
+    let mut pixels: Vec<u8> =
+        rows.flat_map(|padded| &padded[..(width * PIXEL) as usize]).copied().collect();
     if matches!(texture.format(), TextureFormat::Bgra8Unorm | TextureFormat::Bgra8UnormSrgb) {
-        picture.pixels.chunks_exact_mut(PIXEL as usize).for_each(|pixel| pixel.swap(0, 2));
+        pixels.chunks_exact_mut(PIXEL as usize).for_each(|pixel| pixel.swap(0, 2));
     }
-    Ok(picture)
-}
-
-/// Memory that a picture is read through.
-struct Readback {
-    buffer: Buffer,
-    width: u32,
-    height: u32,
-    /// Bytes from one row to the next.
-    stride: u32,
-}
-
-impl Readback {
-    fn new(device: &Device, width: u32, height: u32) -> Self {
-        let stride = (width * PIXEL).next_multiple_of(COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = device.create_buffer(&BufferDescriptor {
-            label: Some("picture"),
-            size: u64::from(stride) * u64::from(height),
-            usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        Self { buffer, width, height, stride }
-    }
-
-    /// Copies a texture of this size after what was encoded so far.
-    fn copy(&self, encoder: &mut CommandEncoder, texture: &Texture) {
-        let layout = TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(self.stride),
-            rows_per_image: Some(self.height),
-        };
-        let (width, height) = (self.width, self.height);
-        encoder.copy_texture_to_buffer(
-            texture.as_image_copy(),
-            TexelCopyBufferInfo { buffer: &self.buffer, layout },
-            Extent3d { width, height, depth_or_array_layers: 1 },
-        );
-    }
-
-    /// Waits for what was submitted, and reads it.
-    fn read(&self, gpu: &Gpu) -> Result<Picture, GraphicsError> {
-        let bytes =
-            read_buffer(gpu, &self.buffer).map_err(|error| gpu.failure().unwrap_or(error))?;
-        let (stride, row) = (self.stride as usize, (self.width * PIXEL) as usize);
-        let pixels = bytes.chunks(stride).flat_map(|padded| &padded[..row]).copied().collect();
-        Ok(Picture { width: self.width, height: self.height, pixels })
-    }
+    Ok(Picture { width, height, pixels })
 }
 
 /// Waits for what was submitted, and reads a buffer.

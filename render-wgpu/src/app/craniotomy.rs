@@ -1,8 +1,6 @@
 //! `dualframe craniotomy`.
 
 use std::cell::Cell;
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::Path;
 use std::sync::Arc;
 use std::thread;
@@ -13,7 +11,7 @@ use dualframe_sim::behavior::Bone;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::device::link::{HapticLink, SimulationEnd, ToolState};
 use dualframe_sim::device::motion::Motion;
-use dualframe_sim::executor::{FrameRecord, OnFrame};
+use dualframe_sim::executor::{ExecutorError, FrameRecord, OnFrame};
 use dualframe_sim::geometry::{Bounds, Volume};
 use dualframe_sim::image;
 use dualframe_sim::manager::VeManager;
@@ -23,25 +21,23 @@ use dualframe_sim::scene::Scene;
 use dualframe_sim::scene::craniotomy::{
     self, LOOK_FRAMES, Operation, SKULL, Step, TIME_STEP, TOOLS,
 };
-use dualframe_sim::timeline::Timeline;
 use glam::Vec3;
 
 use super::AllocationCounter;
 use super::args::CraniotomyArgs;
 use super::error::RunError;
 use super::haptics::{Cells, Each, Loops};
-use super::manage::{Manage, Spent, manage};
+use super::manage::{Manage, Spent, manage, timeline_of};
 use super::measure::Measure;
 use super::operator::Operator;
-use super::outputs::{self, Outputs};
-use super::particles::{SHOWN_SPANS, TRACED_SPANS};
+use super::outputs::Outputs;
 use super::pictures::Pictures;
-use super::progress;
+use super::progress::Progress;
 use super::recording::Recording;
 use super::report::{OperationReport, Report};
 use super::scenes::Patient;
 use super::told::Told;
-use super::window::{CraniotomyAtHand, Session, most_threads};
+use super::window::{CraniotomyAtHand, Session};
 
 /// From how far the place of the operation is seen, over the size of its box.
 const DISTANCE: f32 = 1.4;
@@ -74,20 +70,16 @@ fn run_beside<'c>(
     told: &Told,
 ) -> Result<Report, RunError> {
     let settings = args.way.settings(Grain::Pairwise);
-    let is_traced = outputs.trace.is_some();
-    let spans = if is_traced { TRACED_SPANS } else { SHOWN_SPANS };
-    // One more for whoever renders beside rayon's workers.
-    let workers = most_threads(settings.threads) + 1;
-    let timeline = Arc::new(Timeline::new(workers, spans));
     let at_hand = || Ok(CraniotomyAtHand::begin(args, patient, start()?));
     let how = (&args.way, &args.products);
     let spent = Spent::default();
     let window = match args.simulated_devices {
         true => None,
-        false => Session::open(at_hand, how, TIME_STEP, (&timeline, &spent), told)?,
+        false => Session::open(at_hand, how, TIME_STEP, &spent, told)?,
     };
-    let is_watched = window.is_some() || is_traced;
-    let manage = |scene| manage(scene, settings, is_watched.then_some(&timeline));
+    let traced = || outputs.trace.as_ref().map(|_| timeline_of(&args.products, settings.threads));
+    let timeline = window.as_ref().map(Session::timeline).or_else(traced);
+    let manage = |scene| manage(scene, settings, timeline.as_ref());
     let manager = manage(scene)?;
     let begin = |manager: &VeManager| {
         Recording::begin(outputs.record.as_deref(), patient.spec(), manager, told)
@@ -107,10 +99,7 @@ fn run_beside<'c>(
             run_unwatched((args, patient, outputs), links, how, begin, count, told)?
         }
     };
-    if let Some(file) = &outputs.trace {
-        let write = |writer: &mut BufWriter<&File>| timeline.write_chrome_trace(writer);
-        told.attempt(outputs::replace(file, write).map_err(RunError::Trace));
-    }
+    told.attempt(outputs.write_trace(timeline.as_deref()));
     if let Some(output) = &outputs.save {
         told.attempt(save(patient, &manager, output.path()));
     }
@@ -134,27 +123,23 @@ fn run_unwatched<'a, 'c, 'h>(
     let frames = args.frames.unwrap_or_else(|| surgery.frames());
     let mut pictures = Pictures::new(&args.products, frames, look(surgery.region()), told)?;
     let mut recording = begin(&manager)?;
-    let mut measure = Measure::new(Some(frames), count);
-    let bar = progress::of_frames(frames);
     let mut unwatched = NullRenderer::new();
-    measure.start();
+    let mut progress = Progress::begin(frames, count);
     while manager.frame() < frames {
         let renderer: &mut dyn Renderer = match &mut pictures {
             Some(pictures) => pictures,
             None => &mut unwatched,
         };
-        let mut on_frame = |record: &FrameRecord| {
-            measure.frame(record);
-            if !bar.is_hidden() {
-                measure.beside(|| bar.inc(1));
-            }
-        };
         let left = frames - manager.frame();
-        let how = (&mut on_frame as &mut OnFrame<'_>, manage);
-        manager = surgery.advance(manager, &mut recording, left, renderer, how)?;
+        let on_frame = &mut |record: &FrameRecord| progress.frame(record);
+        let advanced = surgery.advance(&mut manager, &mut recording, left, renderer, on_frame);
+        if told.attempt(advanced.map_err(RunError::from)).is_none() {
+            break;
+        }
+        manager = surgery.look(manager, &mut recording, manage)?;
     }
     recording.end(&manager);
-    bar.finish_and_clear();
+    let measure = progress.end();
     if let Some(pictures) = pictures {
         pictures.finish(outputs.picture.as_deref());
     }
@@ -210,15 +195,15 @@ impl<'c> Surgery<'c> {
         self.operation.report(|see| manager.visit(see))
     }
 
-    /// Advances by so many frames, or until freed bone is looked for.
+    /// Advances by so many frames, or until freed bone is to be looked for.
     pub(super) fn advance(
         &mut self,
-        mut manager: VeManager,
+        manager: &mut VeManager,
         recording: &mut Recording<'_>,
         frames: u64,
         renderer: &mut dyn Renderer,
-        (on_frame, manage): (&mut OnFrame<'_>, Manage<'_>),
-    ) -> Result<VeManager, RunError> {
+        on_frame: &mut OnFrame<'_>,
+    ) -> Result<(), ExecutorError> {
         let until_look = LOOK_FRAMES - manager.frame() % LOOK_FRAMES;
         let (hands, mut watch) = self.operation.parts(renderer);
         let mailbox = manager.mailbox();
@@ -227,8 +212,18 @@ impl<'c> Surgery<'c> {
             hands.swapped(record.frame, &mailbox);
             on_frame(record);
         };
-        recording.run(&mut manager, frames.min(until_look), &mut watch, &mut on_frame)?;
+        let run = recording.run(manager, frames.min(until_look), &mut watch, &mut on_frame);
         self.devices = [0, 1].map(|hand| hands.device(hand));
+        run
+    }
+
+    /// Makes objects of bone that came free, if it is time to look for it.
+    pub(super) fn look(
+        &mut self,
+        manager: VeManager,
+        recording: &mut Recording<'_>,
+        manage: Manage<'_>,
+    ) -> Result<VeManager, RunError> {
         let (seconds, is_another) = (manager.stage_seconds(), Cell::new(false));
         let (manager, freed) = self.operation.look(manager, |scene| {
             is_another.set(true);

@@ -27,6 +27,8 @@ pub(super) enum RunError {
     Picture(#[source] io::Error),
     #[error("the trace cannot be written")]
     Trace(#[source] io::Error),
+    #[error("the report cannot be printed")]
+    Print(#[source] io::Error),
     #[error("cannot write the JSON")]
     Json(#[source] io::Error),
     #[error(transparent)]

@@ -8,7 +8,8 @@ use dualframe_sim::experiment::machine::Machine;
 use dualframe_sim::experiment::{self, PAGE, Report};
 
 use super::args::ExperimentArgs;
-use super::outputs::{Output, make_folder};
+use super::error::RunError;
+use super::outputs::{self, Output, make_folder};
 use super::progress;
 
 /// Makes the folder and sees that it can be written to: an hour's run must not end in "no such
@@ -19,7 +20,7 @@ pub(super) fn prepare(out: &Path) -> Result<(), String> {
 }
 
 /// Runs the experiments that `args` ask for.
-pub(super) fn run(args: &ExperimentArgs) -> Result<(), ExperimentError> {
+pub(super) fn run(args: &ExperimentArgs) -> Result<Vec<Report>, ExperimentError> {
     let (experiments, plan) = (args.experiments(), args.plan());
     let work = experiments.iter().map(|experiment| experiment.work(&plan)).sum();
     let bar = progress::of_work(work);
@@ -28,14 +29,16 @@ pub(super) fn run(args: &ExperimentArgs) -> Result<(), ExperimentError> {
         bar.inc(done);
     })?;
     bar.finish_and_clear();
-    // A closed pipe is no concern of somebody who has the folder.
-    let _printed = print(&reports, args, plan.seed);
-    Ok(())
+    Ok(reports)
 }
 
-fn print(reports: &[Report], args: &ExperimentArgs, seed: u64) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    writeln!(out, "{}; seed {seed}", Machine::this())?;
+/// Prints what was found.
+pub(super) fn print(reports: &[Report], args: &ExperimentArgs) -> Result<(), RunError> {
+    outputs::print(|out| lines(out, reports, args))
+}
+
+fn lines(out: &mut impl Write, reports: &[Report], args: &ExperimentArgs) -> io::Result<()> {
+    writeln!(out, "{}; seed {}", Machine::this(), args.plan().seed)?;
     for figure in reports.iter().flat_map(|report| &report.figures) {
         writeln!(out, "{}: {}", figure.title, figure.finding)?;
     }

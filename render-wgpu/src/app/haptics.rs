@@ -1,5 +1,6 @@
 //! The haptic loops of two hands, whose devices are set by the mouse.
 
+use std::fmt;
 use std::thread::Scope;
 
 use dualframe_sim::device::figures::{Forces, Ticks};
@@ -96,5 +97,19 @@ impl From<&ToolState> for HapticsReport {
             absorbed_j: forces.absorbed,
             least_absorbed_j: forces.least_absorbed,
         }
+    }
+}
+
+impl fmt::Display for HapticsReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { ticks, models, latest_ms, greatest_age_ms, absorbed_j, .. } = self;
+        let late = 100.0 * self.late_share;
+        write!(f, "haptic loop: {ticks} ticks, {late:.2} % late, {latest_ms:.2} ms at most; ")?;
+        write!(f, "{models} models, {greatest_age_ms:.1} ms old at most; ")?;
+        let (error_rms, greatest_error) = (self.error_rms_n, self.greatest_error_n);
+        write!(
+            f,
+            "error {error_rms:.3} N, {greatest_error:.2} N at most; {absorbed_j:.3} J absorbed"
+        )
     }
 }

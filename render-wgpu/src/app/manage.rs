@@ -3,12 +3,18 @@
 use std::cell::RefCell;
 use std::sync::Arc;
 
-use dualframe_sim::executor::StageSeconds;
+use dualframe_sim::executor::{ExecutorError, StageSeconds};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::scene::Scene;
 use dualframe_sim::timeline::Timeline;
 
+use super::args::Products;
 use super::error::RunError;
+
+/// Spans of a worker that its timeline keeps for a trace; usually 65,536, some seconds of work.
+const TRACED_SPANS: usize = 1 << 16;
+/// Spans of a worker that its timeline keeps for a window; usually 4,096, more than is shown.
+const SHOWN_SPANS: usize = 1 << 12;
 
 /// How managers are made anew.
 #[derive(Clone, Copy)]
@@ -43,6 +49,18 @@ impl Spent {
         self.add(&last.stage_seconds());
         self.0.into_inner()
     }
+}
+
+/// A timeline of so many workers, for a window or a trace.
+pub(super) fn timeline_of(products: &Products, workers: usize) -> Arc<Timeline> {
+    let spans = if products.trace.is_some() { TRACED_SPANS } else { SHOWN_SPANS };
+    // One more for whoever renders beside rayon's workers.
+    Arc::new(Timeline::new(workers + 1, spans))
+}
+
+/// Whether a manager can go on after an error, with as many threads as it had before.
+pub(super) fn can_go_on(error: &ExecutorError) -> bool {
+    matches!(error, ExecutorError::Spawn(_) | ExecutorError::Pool(_))
 }
 
 /// A manager whose workers tell a timeline, if there is one, what they do.

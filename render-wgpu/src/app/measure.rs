@@ -132,6 +132,20 @@ mod tests {
     }
 
     #[test]
+    fn of_a_long_session_the_first_frames_are_kept() {
+        let mut measure = Measure::new(None, &|| 0);
+        let first = measure.frame_times.as_ptr();
+        (0..MOST_KEPT + 5).for_each(|frame| measure.frame(&record(frame)));
+        assert_eq!(measure.frames, MOST_KEPT + 5);
+        let Measure { frame_times, candidates, collisions, .. } = measure;
+        assert_eq!(
+            [frame_times.len(), candidates.len(), collisions.len()],
+            [MOST_KEPT as usize; 3]
+        );
+        assert_eq!(frame_times.as_ptr(), first, "in memory taken beforehand");
+    }
+
+    #[test]
     fn allocations_count_after_warm_up() {
         let made = std::sync::atomic::AtomicUsize::new(1_000);
         let count = || made.fetch_add(1, std::sync::atomic::Ordering::Relaxed);

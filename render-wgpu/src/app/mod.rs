@@ -55,10 +55,12 @@ fn run_experiments(args: &ExperimentArgs) -> ExitCode {
     if let Err(line) = experiment::prepare(&args.out) {
         return fail(&line, BAD_ARGUMENT);
     }
+    let told = Told::default();
     match experiment::run(args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => fail(&with_causes(&error), UNSOUND),
+        Ok(reports) => drop(told.attempt(experiment::print(&reports, args))),
+        Err(error) => return fail(&with_causes(&error), UNSOUND),
     }
+    told.status()
 }
 
 fn run_replay(args: &ReplayArgs) -> ExitCode {
@@ -71,8 +73,8 @@ fn run_replay(args: &ReplayArgs) -> ExitCode {
         Ok(report) => report,
         Err(error) => return fail(&line(&error), error.status()),
     };
-    report.print();
     let told = Told::default();
+    told.attempt(report.print());
     if let Some(json) = &json {
         told.attempt(report.write(json));
     }
@@ -111,7 +113,7 @@ fn operate(args: &CraniotomyArgs, allocations: AllocationCounter<'_>) -> ExitCod
 /// Prints and writes what came of a run.
 fn end(report: Result<Report, RunError>, outputs: &Outputs, told: &Told) -> ExitCode {
     if let Some(report) = told.attempt(report) {
-        report.print();
+        told.attempt(report.print());
         if let Some(json) = &outputs.json {
             told.attempt(report.write(json));
         }

@@ -2,17 +2,21 @@
 //! in "no such folder".
 
 use std::fs::{self, File, Metadata, OpenOptions};
-use std::io::{self, BufWriter, ErrorKind, Write};
+use std::io::{self, BufWriter, ErrorKind, StdoutLock, Write};
 use std::ops::Deref;
 #[cfg(unix)]
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
+use dualframe_sim::timeline::Timeline;
 use serde::Serialize;
 
 use super::args::Products;
 use super::error::RunError;
-use super::pictures::{file_of_frame, is_file_of_frame};
+use super::pictures::{file_of_frame, frame_of};
+
+/// Where systems have it, the file that standard output goes to.
+const STANDARD_OUTPUT: &str = "/dev/stdout";
 
 /// The files that a run is to write; what is in them is not touched yet.
 pub(super) struct Outputs {
@@ -52,6 +56,12 @@ impl Outputs {
             check_no_frame(folder, &files)?;
         }
         Ok(outputs)
+    }
+
+    /// Writes what a timeline has, where there are one and a file for it.
+    pub(super) fn write_trace(&self, timeline: Option<&Timeline>) -> Result<(), RunError> {
+        let Some((file, timeline)) = self.trace.as_deref().zip(timeline) else { return Ok(()) };
+        replace(file, |writer| timeline.write_chrome_trace(writer)).map_err(RunError::Trace)
     }
 }
 
@@ -100,11 +110,16 @@ impl Drop for Output {
     }
 }
 
-/// Sees that no two of some files are the same one: what is in it would be lost.
+/// Sees that no two of some files, and none of them and standard output, are the same one: what is in it would be
+/// lost.
 pub(super) fn check_distinct<'a>(paths: impl Iterator<Item = &'a Path>) -> Result<(), String> {
     let mut known: Vec<(&Path, Identity)> = Vec::new();
+    let printed = identity(Path::new(STANDARD_OUTPUT));
     for path in paths {
         let Some(identity) = identity(path) else { continue };
+        if printed.as_ref() == Some(&identity) {
+            return Err(format!("{} is where the report is printed", path.display()));
+        }
         if let Some((same, _)) = known.iter().find(|(_, known)| *known == identity) {
             let (one, other) = (same.display(), path.display());
             return Err(format!("{one} and {other} are the same file"));
@@ -119,7 +134,7 @@ fn check_no_frame(folder: &Path, paths: &[&Path]) -> Result<(), String> {
     let folder = fs::canonicalize(folder).ok();
     let is_frame = |path: &&Path| {
         let found = fs::canonicalize(path).ok();
-        found.is_some_and(|found| found.parent() == folder.as_deref() && is_file_of_frame(&found))
+        found.is_some_and(|found| found.parent() == folder.as_deref() && frame_of(&found).is_some())
     };
     match paths.iter().copied().find(is_frame) {
         Some(path) => Err(format!("{} is where a frame's picture goes", path.display())),
@@ -166,6 +181,18 @@ pub(super) fn replace<'a>(
     let mut writer = BufWriter::new(file);
     write(&mut writer)?;
     writer.flush()
+}
+
+/// Prints what came of a run.
+pub(super) fn print(
+    write: impl FnOnce(&mut StdoutLock<'_>) -> io::Result<()>,
+) -> Result<(), RunError> {
+    let mut out = io::stdout().lock();
+    match write(&mut out).and_then(|()| out.flush()) {
+        // Who has closed a pipe wants no more.
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(RunError::Print(error)),
+        _ => Ok(()),
+    }
 }
 
 /// Writes a file anew, as one JSON object.

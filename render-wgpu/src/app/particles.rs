@@ -1,39 +1,30 @@
 //! `dualframe particles`.
 
-use std::fs::File;
-use std::io::BufWriter;
-use std::sync::Arc;
-
 use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::look::Look;
 use dualframe_sim::blocking::Grain;
-use dualframe_sim::executor::{ExecutorKind, FrameRecord};
+use dualframe_sim::executor::ExecutorKind;
 use dualframe_sim::geometry::Bounds;
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::record::RecordError;
 use dualframe_sim::render::{NullRenderer, Renderer};
 use dualframe_sim::scene::{ParticleScene, Scene, SceneError};
-use dualframe_sim::timeline::Timeline;
 
 use super::AllocationCounter;
 use super::args::Particles;
 use super::error::RunError;
-use super::manage::Spent;
+use super::manage::{Spent, manage, timeline_of};
 use super::measure::Measure;
-use super::outputs::{self, Outputs};
+use super::outputs::Outputs;
 use super::pictures::Pictures;
-use super::progress;
+use super::progress::Progress;
 use super::recording::Recording;
 use super::report::Report;
 use super::told::Told;
-use super::window::{ParticlesAtHand, Session, most_threads};
+use super::window::{ParticlesAtHand, Session};
 
 /// Frames that are run serially too, to say what the speed-up is.
 const REFERENCE_FRAMES: u64 = 48;
-/// Spans of a worker that its timeline keeps for a trace; usually 65,536, some seconds of work.
-pub(super) const TRACED_SPANS: usize = 1 << 16;
-/// Spans of a worker that its timeline keeps for a window; usually 4,096, more than is shown.
-pub(super) const SHOWN_SPANS: usize = 1 << 12;
 
 /// The environment that `args` describe, with another number of particles.
 pub(super) fn scene_of(args: &Particles, objects: usize) -> ParticleScene {
@@ -54,19 +45,14 @@ pub(super) fn run(
     told: &Told,
 ) -> Result<Report, RunError> {
     let settings = args.way.settings(Grain::Spatial);
-    let spans = if args.products.trace.is_some() { TRACED_SPANS } else { SHOWN_SPANS };
-    // One more for whoever renders beside rayon's workers.
-    let workers = most_threads(args.way.threads) + 1;
-    let timeline = Arc::new(Timeline::new(workers, spans));
     let how = (&args.way, &args.products);
     let time_step = ParticleScene::TIME_STEP;
     let at_hand = || Ok(ParticlesAtHand::begin(args));
     let spent = Spent::default();
-    let window = Session::open(at_hand, how, time_step, (&timeline, &spent), told)?;
-    let mut manager = VeManager::new(build(args)?, settings)?;
-    if window.is_some() || outputs.trace.is_some() {
-        manager.watch(Arc::clone(&timeline));
-    }
+    let window = Session::open(at_hand, how, time_step, &spent, told)?;
+    let traced = || outputs.trace.as_ref().map(|_| timeline_of(&args.products, args.way.threads));
+    let timeline = window.as_ref().map(Session::timeline).or_else(traced);
+    let manager = manage(build(args)?, settings, timeline.as_ref())?;
     let report = match window {
         Some(window) => {
             let recording = begin_recording(args, outputs, &manager, told)?;
@@ -79,10 +65,7 @@ pub(super) fn run(
         }
         None => run_unwatched(args, outputs, manager, count, told)?,
     };
-    if let Some(file) = &outputs.trace {
-        let write = |writer: &mut BufWriter<&File>| timeline.write_chrome_trace(writer);
-        told.attempt(outputs::replace(file, write).map_err(RunError::Trace));
-    }
+    told.attempt(outputs.write_trace(timeline.as_deref()));
     Ok(report)
 }
 
@@ -113,23 +96,16 @@ fn run_unwatched(
     let look = look(scene_of(args, args.objects).room());
     let mut pictures = Pictures::new(&args.products, frames, look, told)?;
     let mut recording = begin_recording(args, outputs, &manager, told)?;
-    let mut measure = Measure::new(Some(frames), count);
-    let bar = progress::of_frames(frames);
-    measure.start();
-    let mut on_frame = |record: &FrameRecord| {
-        measure.frame(record);
-        if !bar.is_hidden() {
-            measure.beside(|| bar.inc(1));
-        }
-    };
+    let mut progress = Progress::begin(frames, count);
     let mut unwatched = NullRenderer::new();
     let renderer: &mut dyn Renderer = match &mut pictures {
         Some(pictures) => pictures,
         None => &mut unwatched,
     };
-    recording.run(&mut manager, frames, renderer, &mut on_frame)?;
+    let run = recording.run(&mut manager, frames, renderer, &mut |record| progress.frame(record));
+    let is_run = told.attempt(run.map_err(RunError::from)).is_some();
     recording.end(&manager);
-    bar.finish_and_clear();
+    let measure = progress.end();
     let is_drawn = pictures.is_some();
     if let Some(pictures) = pictures {
         pictures.finish(outputs.picture.as_deref());
@@ -137,7 +113,7 @@ fn run_unwatched(
     let settings = manager.settings();
     let speed_up = match settings.executor {
         // Drawing is no part of the serial run.
-        _ if is_drawn => None,
+        _ if is_drawn || !is_run => None,
         ExecutorKind::Serial => Some(1.0),
         _ => {
             let serial = told.attempt(serial_seconds(args, settings, frames));

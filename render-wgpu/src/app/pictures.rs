@@ -1,7 +1,7 @@
 //! Pictures without a window: of the last frame, or of every one.
 
 use std::ffi::OsStr;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, sync_channel};
@@ -54,6 +54,12 @@ impl<'a> Pictures<'a> {
         let quality = if is_for_speed && gpu.is_software() { Quality::Fast } else { Quality::Fine };
         let mut offscreen = Offscreen::new(gpu, look, quality, args.size)?;
         offscreen.painter.camera = camera;
+        if let Some(folder) = &args.frames_out
+            && has_later(folder, frames)
+        {
+            let folder = folder.display();
+            told.note(&format!("{folder}: pictures from frame {frames} on are of an earlier run"));
+        }
         let sequence = args.frames_out.as_deref().map(Sequence::new).transpose();
         Ok(Some(Self {
             offscreen,
@@ -127,11 +133,17 @@ pub(super) fn file_of_frame(folder: &Path, frame: u64) -> PathBuf {
     folder.join(format!("frame-{frame:06}.png"))
 }
 
-/// Whether a file is called as one that gets a frame's picture.
-pub(super) fn is_file_of_frame(file: &Path) -> bool {
-    let name = file.file_name().and_then(OsStr::to_str);
-    let number = name.and_then(|name| name.strip_prefix("frame-")?.strip_suffix(".png"));
-    number.is_some_and(|number| number.parse::<u64>().is_ok())
+/// The frame whose picture a file is called as one that gets it.
+pub(super) fn frame_of(file: &Path) -> Option<u64> {
+    let name = file.file_name().and_then(OsStr::to_str)?;
+    name.strip_prefix("frame-")?.strip_suffix(".png")?.parse().ok()
+}
+
+/// Whether a folder has pictures of frames that a run of so many does not have.
+fn has_later(folder: &Path, frames: u64) -> bool {
+    // What cannot be read here is told where it is written to.
+    let mut files = fs::read_dir(folder).into_iter().flatten().flatten();
+    files.any(|file| frame_of(&file.path()).is_some_and(|frame| frame >= frames))
 }
 
 /// Pictures on their way to files, written by a thread of their own.

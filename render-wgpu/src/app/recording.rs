@@ -8,6 +8,7 @@ use dualframe_sim::record::{Control, Header, RecordError, Recorder, SceneSpec};
 use dualframe_sim::render::Renderer;
 
 use super::error::RunError;
+use super::manage::can_go_on;
 use super::outputs;
 use super::told::Told;
 
@@ -45,7 +46,13 @@ impl<'a> Recording<'a> {
         if let Some(recorder) = &mut self.recorder {
             match recorder.run(manager, frames, renderer, on_frame) {
                 Ok(()) => return Ok(()),
-                Err(RecordError::Executor(error)) => return Err(error),
+                Err(RecordError::Executor(error)) => {
+                    if !can_go_on(&error) {
+                        // The state depends on the schedule now: nothing may be recorded of it.
+                        self.recorder = None;
+                    }
+                    return Err(error);
+                }
                 Err(error) => self.fail(error, manager),
             }
         }

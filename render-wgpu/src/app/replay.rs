@@ -195,9 +195,8 @@ fn report(
 
 impl ReplayReport {
     /// Prints the closing lines.
-    pub(super) fn print(&self) {
-        // A closed pipe must not turn a sound run into a panic.
-        let _printed = self.lines(&mut io::stdout().lock());
+    pub(super) fn print(&self) -> Result<(), RunError> {
+        outputs::print(|out| self.lines(out))
     }
 
     fn lines(&self, out: &mut impl Write) -> io::Result<()> {

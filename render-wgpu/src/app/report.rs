@@ -34,6 +34,8 @@ pub(super) struct Report {
     pub(super) fps: f64,
     /// Over the serial executor, on the same first frames; not where frames are drawn.
     pub(super) speed_up: Option<f64>,
+    /// The first ones, of which the report has times, candidates and collisions: of a window's not always all.
+    pub(super) frames_measured: usize,
     pub(super) frame_ms: FrameMilliseconds,
     pub(super) candidates: Vec<u32>,
     pub(super) collisions: Vec<u32>,
@@ -208,6 +210,7 @@ impl Report {
             seconds,
             fps: measure.frames as f64 / seconds.max(f64::MIN_POSITIVE),
             speed_up: None,
+            frames_measured: measure.frame_times.len(),
             frame_ms: FrameMilliseconds::of(&measure.frame_times),
             candidates: measure.candidates.clone(),
             collisions: measure.collisions.clone(),
@@ -231,9 +234,8 @@ impl Report {
     }
 
     /// Prints the closing table.
-    pub(super) fn print(&self) {
-        // A closed pipe must not turn a sound run into a panic.
-        let _printed = self.table(&mut std::io::stdout().lock());
+    pub(super) fn print(&self) -> Result<(), RunError> {
+        outputs::print(|out| self.table(out))
     }
 
     fn table(&self, out: &mut impl Write) -> std::io::Result<()> {
@@ -248,6 +250,10 @@ impl Report {
             writeln!(out, "speed-up over the serial run: {speed_up:.2} (first frames of both)")?;
         }
         let FrameMilliseconds { p50, p99, p999, max } = frame_ms;
+        let measured = self.frames_measured;
+        if (measured as u64) < *frames {
+            writeln!(out, "of the first {measured} frames:")?;
+        }
         writeln!(
             out,
             "frame time, ms: median {p50:.3}, 99 % {p99:.3}, 99.9 % {p999:.3}, longest {max:.3}"
@@ -276,7 +282,7 @@ impl Report {
 
 impl OperationReport {
     fn lines(&self, out: &mut impl Write) -> std::io::Result<()> {
-        let Self { step, pieces, bone_removed_mm3, score, .. } = self;
+        let Self { step, pieces, bone_removed_mm3, score, haptics } = self;
         writeln!(out, "{step}: {bone_removed_mm3:.1} mm³ of bone removed, {pieces} pieces free")?;
         writeln!(
             out,
@@ -308,6 +314,6 @@ impl OperationReport {
                 "{cut:.0} % of the outline cut, {mean:.2} mm from the plan, {max:.2} mm at most"
             )?;
         }
-        Ok(())
+        haptics.iter().try_for_each(|hand| writeln!(out, "{hand}"))
     }
 }

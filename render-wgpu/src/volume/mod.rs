@@ -89,23 +89,11 @@ impl Volumes {
     }
 
     fn draw(&self, pass: &mut RenderPass<'_>, pipeline: &RenderPipeline, globals: &BindGroup) {
-        if self.count() == 0 {
-            return;
-        }
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, globals, &[]);
-        for grid in self.shown() {
+        for grid in self.grids.values().filter(|grid| grid.used == self.frame) {
             pass.set_bind_group(1, &grid.bound, &[]);
             pass.draw(0..CORNERS, 0..1);
         }
-    }
-
-    /// The number of volumes in this frame.
-    pub(crate) fn count(&self) -> usize {
-        self.shown().count()
-    }
-
-    fn shown(&self) -> impl Iterator<Item = &Grid> {
-        self.grids.values().filter(|grid| grid.used == self.frame)
     }
 }

@@ -87,6 +87,24 @@ fn simulated_hands_operate() {
     refused(&["--haptic-rate", "100"], "500 to 4000 Hz");
 }
 
+#[test]
+fn figures_of_haptic_loops_are_printed() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let json = folder.path().join("report.json");
+    let args = ["craniotomy", "--simulated-devices", "--step", "incision", "--frames", "10"];
+    let output = run(&[&args[..], &["--json", json.to_str().expect("a plain path")]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let printed = String::from_utf8_lossy(&output.stdout);
+    let report = read_json(&json);
+    let hands = report["haptics"].as_array().expect("one for each hand");
+    assert!(!hands.is_empty());
+    let lines: Vec<_> = printed.lines().filter(|line| line.starts_with("haptic loop: ")).collect();
+    assert_eq!(lines.len(), hands.len(), "{printed}");
+    for (line, hand) in lines.iter().zip(hands) {
+        assert!(line.contains(&format!("{} ticks", hand["ticks"])), "{line}");
+    }
+}
+
 /// The environment goes on in another executor whenever freed bone was looked for.
 #[test]
 fn seconds_of_a_drilled_hole_are_those_of_all_frames() {

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::thread;
 
-use crate::command::{read_json, run, told};
+use crate::command::{command, read_json, run, told};
 use dualframe_sim::image::{Image, save};
 use dualframe_sim::scene::head::synthetic_ct;
 use tempfile::TempDir;
@@ -82,6 +82,55 @@ fn pictures_that_fail_cost_no_other_output() {
     failed(&output, &["a picture cannot be written: "]);
     assert_eq!(read_json(json.as_ref())["frames"], 9);
     assert!(picture(1).is_file() && !picture(3).exists());
+}
+
+#[test]
+fn a_report_that_cannot_be_printed_costs_no_other_output() {
+    let folder = Folder::new();
+    let [json, record] = ["report.json", "session"].map(|name| folder.file(name));
+    let unprinted = |args: &[&str]| {
+        let full = File::options().write(true).open(FULL).expect("it is always there");
+        let output = command(args).stdout(full).output().expect("the program starts");
+        told(&output, 1, "the report cannot be printed: ");
+    };
+    let few = ["--headless", "--objects", "5", "--frames", "5", "--json", &json];
+    unprinted(&[&few[..], &["--record", &record]].concat());
+    assert_eq!(read_json(json.as_ref())["frames"], 5);
+    unprinted(&["replay", &record, "--json", &json]);
+    assert_eq!(read_json(json.as_ref())["agrees"], true);
+}
+
+#[test]
+fn a_file_that_the_report_is_printed_to_is_no_other_output() {
+    let folder = Folder::new();
+    let [printed, record] = ["printed", "session"].map(|name| folder.file(name));
+    let few = ["--headless", "--objects", "5", "--frames", "5"];
+    assert!(run(&[&few[..], &["--record", &record]].concat()).status.success());
+    let refused = |args: &[&str]| {
+        let file = File::create(&printed).expect("it can be made");
+        let output = command(args).stdout(file).output().expect("the program starts");
+        told(&output, 2, "is where the report is printed");
+    };
+    for file in ["/dev/stdout", &printed] {
+        refused(&[&few[..], &["--trace", file]].concat());
+        refused(&["replay", &record, "--json", file]);
+    }
+}
+
+#[test]
+#[ignore = "needs a graphics adapter; .ci/run has one"]
+fn pictures_of_an_earlier_run_are_told() {
+    let folder = Folder::new();
+    let frames = folder.file("frames");
+    let draw = |count: &str| {
+        let few = ["--objects", "5", "--size", "32x32", "--headless"];
+        run(&[&few[..], &["--frames", count, "--frames-out", &frames]].concat())
+    };
+    for _ in 0..2 {
+        let output = draw("3");
+        assert!(output.status.success() && output.stderr.is_empty());
+    }
+    told(&draw("2"), 0, "frames: pictures from frame 2 on are of an earlier run");
 }
 
 /// Reads the beginning of a recording up to the end of its first chunk of events, and hears no more.

@@ -26,6 +26,7 @@ fn report_has_every_key() {
         "seed",
         "seconds",
         "fps",
+        "frames_measured",
         "frame_ms",
         "candidates",
         "collisions",

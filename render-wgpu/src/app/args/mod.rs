@@ -211,7 +211,8 @@ pub(in crate::app) struct Particles {
 /// What a run draws and writes.
 #[derive(Args)]
 pub(in crate::app) struct Products {
-    /// Show a window, which is what happens where there is a display
+    /// Show a window, which is what happens where there is a display and nothing is asked for that runs without one:
+    /// --headless, --offscreen, --picture or --frames-out
     #[arg(long, conflicts_with_all = ["headless", "offscreen", "frames_out"])]
     pub(in crate::app) window: bool,
     /// Run without a window
@@ -220,11 +221,11 @@ pub(in crate::app) struct Products {
     /// Draw every frame without a window
     #[arg(long)]
     pub(in crate::app) offscreen: bool,
-    /// Write a picture of the last frame
+    /// Write a picture of the last frame; without --window no window is shown
     #[arg(long, value_name = "FILE.png")]
     pub(in crate::app) picture: Option<PathBuf>,
-    /// Write a picture of every frame into a folder, which is made if it is not there
-    #[arg(long, value_name = "DIR", conflicts_with = "headless")]
+    /// Write a picture of every frame, without a window, into a folder, which is made if it is not there
+    #[arg(long, value_name = "DIR")]
     pub(in crate::app) frames_out: Option<PathBuf>,
     /// Width and height of window and pictures, in pixels
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]

@@ -25,21 +25,20 @@ use std::time::Duration;
 use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::look::Look;
 use dualframe_sim::blocking::Grain;
-use dualframe_sim::executor::{ExecutorKind, FrameRecord, OnFrame};
+use dualframe_sim::executor::{ExecutorError, ExecutorKind, FrameRecord, OnFrame};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::scene::Scene;
 use dualframe_sim::stages;
 use dualframe_sim::timeline::Timeline;
 
-use self::controls::Controls;
-pub(super) use self::controls::most_threads;
+use self::controls::{Controls, most_threads};
 pub(super) use self::craniotomy::CraniotomyAtHand;
 use self::hand::Hand;
 pub(super) use self::particles::ParticlesAtHand;
 use self::view::{Shown, View};
 use super::args::{Products, Way, entry};
 use super::error::RunError;
-use super::manage::{Manage, Spent, manage};
+use super::manage::{Manage, Spent, can_go_on, manage, timeline_of};
 use super::measure::Measure;
 use super::pictures;
 use super::recording::Recording;
@@ -64,24 +63,31 @@ pub(super) trait Scenario {
     fn look(&self) -> (Look, Camera);
 
     /// The environment, to begin anew.
-    fn build(&mut self, hand: &Self::Hand) -> Result<Scene, RunError>;
+    fn build(&self, hand: &Self::Hand) -> Result<Scene, RunError>;
+
+    /// It is begun anew, in an environment that was built for it.
+    fn begin_anew(&mut self, hand: &Self::Hand);
 
     /// Does what is new in the hand's part of the overlay.
-    fn apply(
-        &mut self,
-        hand: &Self::Hand,
-        manager: &mut VeManager,
-        recording: &mut Recording<'_>,
-    ) -> Result<(), RunError>;
+    fn apply(&mut self, hand: &Self::Hand, manager: &mut VeManager, recording: &mut Recording<'_>);
 
     /// Advances by so many frames or fewer, but one at least.
     fn advance(
         &mut self,
         view: &mut View<Self::Hand>,
-        manager: VeManager,
+        manager: &mut VeManager,
         recording: &mut Recording<'_>,
         frames: u64,
-        host: (&mut OnFrame<'_>, Manage<'_>),
+        on_frame: &mut OnFrame<'_>,
+    ) -> Result<(), ExecutorError>;
+
+    /// Does what takes the environment out of its manager, and gives back one in which it is.
+    fn tend(
+        &mut self,
+        view: &mut View<Self::Hand>,
+        manager: VeManager,
+        recording: &mut Recording<'_>,
+        manage: Manage<'_>,
     ) -> Result<VeManager, RunError>;
 }
 
@@ -91,6 +97,10 @@ pub(super) struct Session<'a, S: Scenario> {
     view: View<S::Hand>,
     /// What the environment was last told.
     applied: Controls,
+    /// As many threads as could be had.
+    hired: usize,
+    /// Whether the window has gone, since it failed.
+    is_left: bool,
     way: &'a Way,
     spent: &'a Spent,
     told: &'a Told,
@@ -106,7 +116,7 @@ impl<'a, S: Scenario> Session<'a, S> {
         make: impl FnOnce() -> Result<(S, S::Hand), RunError>,
         (way, products): (&'a Way, &Products),
         time_step: f32,
-        (timeline, spent): (&Arc<Timeline>, &'a Spent),
+        spent: &'a Spent,
         told: &'a Told,
     ) -> Result<Option<Self>, RunError> {
         if !products.prefers_window() {
@@ -117,11 +127,14 @@ impl<'a, S: Scenario> Session<'a, S> {
         let shown = Shown {
             size: products.size,
             time_step: Duration::from_secs_f32(time_step),
-            timeline: Arc::clone(timeline),
+            timeline: timeline_of(products, most_threads(way.threads)),
             hand,
         };
         match View::open(shown, scenario.look(), products.adapter.as_deref(), controls) {
-            Ok(view) => Ok(Some(Self { scenario, view, applied: controls, way, spent, told })),
+            Ok(view) => {
+                let (applied, hired) = (controls, way.threads);
+                Ok(Some(Self { scenario, view, applied, hired, is_left: false, way, spent, told }))
+            }
             Err(error) if products.window => Err(error.into()),
             Err(error) => {
                 told.note(&format!(
@@ -132,11 +145,16 @@ impl<'a, S: Scenario> Session<'a, S> {
         }
     }
 
-    /// Runs the environment until the window is closed, or so many frames are done; gives back the
+    /// What tells what its workers do.
+    pub(super) fn timeline(&self) -> Arc<Timeline> {
+        Arc::clone(&self.view.timeline)
+    }
+
+    /// Runs the environment until the window is closed, so many frames are done, or they cannot go on; gives back the
     /// environment as it is then, and the scenario.
     ///
     /// # Errors
-    /// The executor cannot go on.
+    /// No other manager could be made of an environment that was taken out of one: it is lost.
     pub(super) fn run(
         mut self,
         mut manager: VeManager,
@@ -147,7 +165,7 @@ impl<'a, S: Scenario> Session<'a, S> {
     ) -> Result<(VeManager, S), RunError> {
         self.view.turn_to(self.scenario.look(), manager.mailbox());
         let mut left = frames.unwrap_or(u64::MAX);
-        while left > 0 && !self.view.is_closing() {
+        while left > 0 && !self.is_over(frames) {
             manager = self.apply(manager, &mut recording, measure)?;
             let controls = &mut self.view.controls;
             let is_paused = controls.is_paused;
@@ -161,26 +179,46 @@ impl<'a, S: Scenario> Session<'a, S> {
                 continue;
             }
             // Not before time goes on: what is told meanwhile would pile up.
-            self.scenario.apply(&self.view.hand, &mut manager, &mut recording)?;
+            self.scenario.apply(&self.view.hand, &mut manager, &mut recording);
             let before = manager.frame();
-            manager = self.advance(manager, &mut recording, wanted.min(left), measure)?;
+            let advanced = self.advance(&mut manager, &mut recording, wanted.min(left), measure);
             let done = manager.frame() - before;
             left -= done;
             if is_paused {
                 self.view.controls.steps += wanted - done;
             }
+            match advanced.map_err(|error| self.goes_on_after(error)) {
+                Ok(()) => self.hired = self.applied.threads,
+                Err(true) => continue,
+                Err(false) => break,
+            }
+            manager = self.tend(manager, &mut recording)?;
         }
         recording.end(&manager);
-        let drawn = match (self.view.failure(), picture) {
-            (Some(failure), _) => Err(failure.into()),
-            (None, Some(file)) => {
-                self.take(&manager);
-                pictures::write(self.view.picture(), file)
-            }
-            (None, None) => Ok(()),
-        };
-        self.told.attempt(drawn);
+        if !self.has_failed()
+            && let Some(file) = picture
+        {
+            self.take(&manager);
+            self.told.attempt(pictures::write(self.view.picture(), file));
+        }
         Ok((manager, self.scenario))
+    }
+
+    /// Whether it was closed, or nothing is to be seen any more and nobody said how many frames are to be done.
+    fn is_over(&mut self, frames: Option<u64>) -> bool {
+        self.view.is_closed() || (self.has_failed() && frames.is_none())
+    }
+
+    /// Whether the window has failed, which is told once.
+    fn has_failed(&mut self) -> bool {
+        if !self.is_left
+            && let Some(failure) = self.view.failure()
+        {
+            self.told.failure(&failure.into());
+            self.view.leave();
+            self.is_left = true;
+        }
+        self.is_left
     }
 
     fn frames_of_a_run(&self) -> u64 {
@@ -190,21 +228,37 @@ impl<'a, S: Scenario> Session<'a, S> {
 
     fn advance(
         &mut self,
-        manager: VeManager,
+        manager: &mut VeManager,
         recording: &mut Recording<'_>,
         frames: u64,
         measure: &mut Measure<'_>,
-    ) -> Result<VeManager, RunError> {
+    ) -> Result<(), ExecutorError> {
         let stats = Arc::clone(&self.view.stats);
         let mut on_frame = |record: &FrameRecord| {
             stats::lock(&stats).note(record);
             measure.frame(record);
         };
-        let (settings, timeline) = (self.settings(), Arc::clone(&self.view.timeline));
+        self.scenario.advance(&mut self.view, manager, recording, frames, &mut on_frame)
+    }
+
+    /// Says why frames could not run, and whether others can: where threads could not be had, with those that there
+    /// were before.
+    fn goes_on_after(&mut self, error: ExecutorError) -> bool {
+        let asked = std::mem::replace(&mut self.view.controls.threads, self.hired);
+        let goes_on = can_go_on(&error) && asked != self.hired;
+        self.told.failure(&error.into());
+        goes_on
+    }
+
+    fn tend(
+        &mut self,
+        manager: VeManager,
+        recording: &mut Recording<'_>,
+    ) -> Result<VeManager, RunError> {
+        let (settings, timeline) = (self.settings(), self.timeline());
         let make = move |scene| manage(scene, settings, Some(&timeline));
         let manage = Manage { make: &make, spent: self.spent };
-        let host = (&mut on_frame as &mut OnFrame<'_>, manage);
-        self.scenario.advance(&mut self.view, manager, recording, frames, host)
+        self.scenario.tend(&mut self.view, manager, recording, manage)
     }
 
     /// Takes all objects as they are, to be drawn.
@@ -232,13 +286,13 @@ impl<'a, S: Scenario> Session<'a, S> {
         let (now, before) = (self.view.controls, self.applied);
         self.applied = now;
         let is_restarted = now.restarts != before.restarts;
-        if is_restarted {
+        if is_restarted && let Some(other) = self.told.attempt(self.restart()) {
             if recording.end(&manager) {
                 let frame = manager.frame();
                 self.told.note(&format!("the recording ends before frame {frame}: started anew"));
             }
             self.spent.add(&manager.stage_seconds());
-            manager = self.restart()?;
+            manager = other;
         }
         let is_pipeline = now.executor == ExecutorKind::Pipeline;
         let is_rebuilt = now.executor != before.executor
@@ -257,16 +311,19 @@ impl<'a, S: Scenario> Session<'a, S> {
         Ok(manager)
     }
 
-    /// Starts anew.
+    /// Starts anew, if it can.
     fn restart(&mut self) -> Result<VeManager, RunError> {
         let scene = self.scenario.build(&self.view.hand)?;
         let manager = self.manage(scene)?;
+        self.scenario.begin_anew(&self.view.hand);
         self.view.turn_to(self.scenario.look(), manager.mailbox());
         Ok(manager)
     }
 
-    fn manage(&self, scene: Scene) -> Result<VeManager, RunError> {
-        manage(scene, self.settings(), Some(&self.view.timeline))
+    fn manage(&mut self, scene: Scene) -> Result<VeManager, RunError> {
+        let manager = manage(scene, self.settings(), Some(&self.view.timeline))?;
+        self.hired = self.applied.threads;
+        Ok(manager)
     }
 
     /// What the person has set.

@@ -1,12 +1,15 @@
 //! The overlay on the device.
 
+use std::num::NonZeroU64;
+
 use dualframe_render_wgpu::gpu::Gpu;
 use egui::{Context, TextureId, Ui, ViewportId};
 use egui_wgpu::{Renderer, RendererOptions, ScreenDescriptor};
 use egui_winit::State;
 use wgpu::{
-    CommandBuffer, CommandEncoder, LoadOp, Operations, RenderPassColorAttachment,
-    RenderPassDescriptor, StoreOp, Texture, TextureFormat,
+    Buffer, BufferDescriptor, BufferUsages, COPY_BUFFER_ALIGNMENT, CommandBuffer, CommandEncoder,
+    LoadOp, Operations, RenderPassColorAttachment, RenderPassDescriptor, StoreOp, Texture,
+    TextureFormat,
 };
 use winit::window::Window;
 
@@ -14,6 +17,8 @@ use winit::window::Window;
 pub(super) struct OverlayPainter {
     context: Context,
     renderer: Renderer,
+    /// What is written to see whether the device takes anything.
+    probe: Buffer,
     /// Textures given up with the last output, whose commands were not submitted yet.
     given_up: Vec<TextureId>,
 }
@@ -23,7 +28,13 @@ impl OverlayPainter {
         let renderer = Renderer::new(&gpu.device, format, RendererOptions::default());
         let context = Context::default();
         context.set_visuals(egui::Visuals::dark());
-        Self { context, renderer, given_up: Vec::new() }
+        let probe = gpu.device.create_buffer(&BufferDescriptor {
+            label: Some("probe"),
+            size: COPY_BUFFER_ALIGNMENT,
+            usage: BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        Self { context, renderer, probe, given_up: Vec::new() }
     }
 
     /// What turns the window's events into egui's.
@@ -33,7 +44,8 @@ impl OverlayPainter {
     }
 
     /// Lays out what `show` says and encodes how it is drawn over `picture`, which may be of another size
-    /// than the window has by now. Some commands must be submitted before the encoder's.
+    /// than the window has by now. Some commands must be submitted before the encoder's. Nothing is drawn by a device
+    /// that is lost.
     pub(super) fn paint(
         &mut self,
         gpu: &Gpu,
@@ -42,6 +54,12 @@ impl OverlayPainter {
         show: impl FnMut(&mut Ui),
     ) -> Vec<CommandBuffer> {
         let Gpu { device, queue, .. } = gpu;
+        // Egui's renderer panics where the device is lost, which need not be noted yet.
+        let size = NonZeroU64::new(self.probe.size());
+        let is_lost = size.and_then(|size| queue.write_buffer_with(&self.probe, 0, size)).is_none();
+        if is_lost {
+            return Vec::new();
+        }
         self.given_up.drain(..).for_each(|id| self.renderer.free_texture(&id));
         let mut output = self.context.run_ui(input.take_egui_input(window), show);
         input.handle_platform_output(window, output.platform_output);

@@ -120,6 +120,7 @@ impl<H: Hand> View<H> {
         let refresh =
             window.current_monitor().and_then(|monitor| monitor.refresh_rate_millihertz());
         let refresh = refresh.map(|rate| f64::from(rate.max(1_000)) * 1e-3);
+        let pace = Pace::new(refresh, shown.time_step, painter.gpu().is_software());
         Ok(Self {
             event_loop: SendWrapper::new(event_loop),
             input,
@@ -136,19 +137,25 @@ impl<H: Hand> View<H> {
             timeline: shown.timeline,
             mailbox: Mailbox::new(),
             is_shown: true,
-            pace: Pace::new(refresh, shown.time_step),
+            pace,
             failure: None,
         })
     }
 
-    /// Whether the window is to go.
-    pub(super) fn is_closing(&self) -> bool {
-        self.input.is_closing || self.failure().is_some()
+    /// Whether the person has closed it.
+    pub(super) fn is_closed(&self) -> bool {
+        self.input.is_closing
     }
 
     /// Why nothing is drawn any more, if so.
     pub(super) fn failure(&self) -> Option<GraphicsError> {
         self.failure.clone().or_else(|| self.painter.failure())
+    }
+
+    /// Goes where nothing is drawn any more: frames that are still to come run without it.
+    pub(super) fn leave(&mut self) {
+        self.controls.is_paused = false;
+        self.window.set_visible(false);
     }
 
     /// Another environment is shown. One in the same place is seen as it was.
@@ -175,7 +182,7 @@ impl<H: Hand> View<H> {
         }
         // The list keeps its memory.
         self.input.gestures = gestures;
-        if !self.is_closing() && self.screen.follow(self.painter.gpu(), self.input.size) {
+        if self.failure().is_none() && self.screen.follow(self.painter.gpu(), self.input.size) {
             let (width, height) = self.screen.size();
             if let Err(error) = self.painter.resize(width, height) {
                 self.failure = Some(error);
@@ -334,12 +341,18 @@ impl<H: Hand> Renderer for View<H> {
         if self.is_shown {
             self.redraw();
         }
+        self.is_shown = false;
+        if self.failure().is_some() {
+            return;
+        }
         self.attend(Duration::ZERO);
         self.follow(true);
         self.pace.keep(self.controls.is_real_time);
         // What is taken is drawn: else it would be there still when a last picture is taken.
-        self.is_shown =
-            !self.is_closing() && self.pace.shows(self.painter.gpu()) && self.is_visible();
+        self.is_shown = !self.is_closed()
+            && self.pace.shows(self.painter.gpu())
+            && self.failure().is_none()
+            && self.is_visible();
     }
 
     fn is_bound(&self) -> bool {

@@ -12,6 +12,8 @@ const ONE: [&str; 6] = ["--objects", "1", "--threads", "2", "--size", "640x640"]
 const ROW: i16 = 23;
 /// Where the overlay's second column begins, and a little more.
 const COLUMN: i16 = 124;
+/// Less memory than a thread's stack has, in bytes.
+const LITTLE: u64 = 1 << 20;
 
 /// The program with the overlay standing still, and how high the slider of workers is.
 fn paused(desktop: &Desktop) -> (Session<'_>, i16) {
@@ -40,6 +42,25 @@ fn workers_join_and_leave() {
     // The left end of the slider.
     session.click(COLUMN - 5, workers);
     assert_eq!(end(session)["threads"], 1);
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn workers_that_cannot_be_had_are_told_and_the_run_goes_on() {
+    let desktop = Desktop::start();
+    let (mut session, workers) = paused(&desktop);
+    let paused = session.wait_until_still();
+    let (right, _) = *paused.sliders().last().expect("the overlay is shown");
+    session.click(right, workers);
+    session.leave_room(Some(LITTLE));
+    session.strike('n');
+    session.wait_until_still();
+    session.leave_room(None);
+    session.strike('n');
+    session.wait_until_still();
+    let report = session.close_after("the thread pool could not be started");
+    assert_eq!(report["threads"], 2);
+    assert_eq!(report["state_hash"], untouched(&ONE, &report["frames"]));
 }
 
 #[test]

@@ -3,10 +3,11 @@
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use super::screenshot::Screenshot;
 use crate::command::{command, read_json};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -309,29 +310,67 @@ impl Session<'_> {
 
     /// The memory that it has, in bytes.
     pub(crate) fn memory(&self) -> u64 {
+        self.bytes_of("VmRSS:")
+    }
+
+    fn bytes_of(&self, kind: &str) -> u64 {
         let status = fs::read_to_string(format!("/proc/{}/status", self.child.id()));
         let status = status.expect("it runs on Linux");
-        let resident = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
-        let kilobytes = resident.and_then(|rest| rest.trim().strip_suffix(" kB"));
+        let found = status.lines().find_map(|line| line.strip_prefix(kind));
+        let kilobytes = found.and_then(|rest| rest.trim().strip_suffix(" kB"));
         1_024 * kilobytes.and_then(|number| number.parse::<u64>().ok()).expect("a number")
+    }
+
+    /// Leaves it so many bytes of its address space that it has not mapped yet, or all.
+    pub(crate) fn leave_room(&self, bytes: Option<u64>) {
+        let most = bytes.map(|bytes| self.bytes_of("VmSize:") + bytes);
+        let most = most.map_or("unlimited".to_owned(), |most| most.to_string());
+        let process = self.child.id().to_string();
+        // Its soft limit, which may be raised again.
+        let limit = format!("--as={most}:");
+        let limited = Command::new("prlimit").args(["--pid", &process, &limit]).status();
+        assert!(limited.expect("there is prlimit, of util-linux").success());
     }
 
     /// Closes the window as a window manager does; see [`Session::end`].
     pub(crate) fn close(self) -> Value {
+        self.ask_to_close();
+        self.end()
+    }
+
+    /// Closes the window of a program that said in one line what went wrong before, and gives back what it reported.
+    pub(crate) fn close_after(mut self, failure: &str) -> Value {
+        self.ask_to_close();
+        let (status, told) = self.wait();
+        assert!(status.code() == Some(1) && told.lines().count() == 1, "{status}: {told}");
+        assert!(told.contains(failure), "no {failure:?} in {told}");
+        self.report()
+    }
+
+    fn ask_to_close(&self) {
         let desktop = self.desktop;
         let data = [desktop.atom("WM_DELETE_WINDOW"), CURRENT_TIME, 0, 0, 0];
         let protocols = desktop.atom("WM_PROTOCOLS");
         let message = ClientMessageEvent::new(32, self.window, protocols, data);
         let (window, nobody) = (self.window, EventMask::NO_EVENT);
         desktop.sync(desktop.connection.send_event(false, window, nobody, message));
-        self.end()
     }
 
     /// Waits for its end, which is to be a sound one, and gives back what it reported.
     fn end(mut self) -> Value {
-        let status = wait_for("the end", || self.child.try_wait().expect("it can be waited for"));
-        let (printed, told) = (self.read("stdout"), self.read("stderr"));
+        let (status, told) = self.wait();
         assert!(status.success() && told.is_empty(), "{status}: {told}");
+        self.report()
+    }
+
+    /// How it ended, and what it said on standard error.
+    fn wait(&mut self) -> (ExitStatus, String) {
+        let status = wait_for("the end", || self.child.try_wait().expect("it can be waited for"));
+        (status, self.read("stderr"))
+    }
+
+    fn report(&self) -> Value {
+        let printed = self.read("stdout");
         assert!(printed.contains("state hash"), "{printed}");
         read_json(&self.folder.path().join("report.json"))
     }
@@ -346,50 +385,5 @@ impl Drop for Session<'_> {
         // It usually has ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
-    }
-}
-
-/// A window's pixels.
-#[derive(Clone, PartialEq)]
-pub(crate) struct Screenshot {
-    pub(crate) width: usize,
-    pub(crate) height: usize,
-    /// Blue, green, red and nothing, row by row from the top.
-    pixels: Vec<u8>,
-}
-
-impl Screenshot {
-    /// Red, green, blue.
-    pub(crate) fn pixel(&self, x: usize, y: usize) -> [u8; 3] {
-        let first = 4 * (y * self.width + x);
-        [2, 1, 0].map(|color| self.pixels[first + color])
-    }
-
-    /// Whether anything was drawn: a window is black before.
-    pub(crate) fn is_drawn(&self) -> bool {
-        self.pixel(self.width - 1, self.height - 1) != [0; 3]
-    }
-
-    /// The overlay's sliders, from above: the right end of each one's bar.
-    pub(crate) fn sliders(&self) -> Vec<(i16, i16)> {
-        // Where the bars of sliders are, and no handle, border or text of anything else.
-        const WITHIN: (usize, usize) = (145, 165);
-        const HIGH: usize = 6;
-        // Apart from the dithering.
-        let is_bar = |x, y| self.pixel(x, y).iter().all(|color| (58..=62).contains(color));
-        let is_row = |y| (WITHIN.0..WITHIN.1).all(|x| is_bar(x, y));
-        let is_top = |&top: &usize| !is_row(top.saturating_sub(1)) && (top..top + HIGH).all(is_row);
-        let end = |top: usize| {
-            let y = top + HIGH / 2;
-            let right = (WITHIN.1..self.width).find(|&x| !is_bar(x, y)).unwrap_or(self.width);
-            (right as i16 - 3, y as i16)
-        };
-        (0..self.height - HIGH).filter(is_top).map(end).collect()
-    }
-
-    /// The number of pixels that another one of the same size has in another colour.
-    pub(crate) fn difference(&self, other: &Self) -> usize {
-        let pixels = self.pixels.chunks_exact(4).zip(other.pixels.chunks_exact(4));
-        pixels.filter(|(one, other)| one[..3] != other[..3]).count()
     }
 }

@@ -3,6 +3,7 @@
 mod controls;
 mod craniotomy;
 mod desktop;
+mod screenshot;
 
 use std::collections::BTreeMap;
 use std::thread::sleep;
@@ -10,7 +11,8 @@ use std::thread::sleep;
 use crate::command::{NO_ADAPTERS, read_json, report, run, told};
 use serde_json::Value;
 
-use self::desktop::{Desktop, STILL, Screenshot};
+use self::desktop::{Desktop, STILL};
+use self::screenshot::Screenshot;
 
 /// One particle, in the middle of the picture.
 const ONE: [&str; 6] = ["--objects", "1", "--threads", "2", "--size", "640x480"];

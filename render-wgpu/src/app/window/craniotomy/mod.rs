@@ -11,7 +11,7 @@ use dualframe_render_wgpu::look::Look;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::device::link::SimulationEnd;
 use dualframe_sim::device::thread::HapticThread;
-use dualframe_sim::executor::OnFrame;
+use dualframe_sim::executor::{ExecutorError, OnFrame};
 use dualframe_sim::manager::VeManager;
 use dualframe_sim::scene::Scene;
 
@@ -75,13 +75,16 @@ impl<'c> Scenario for CraniotomyAtHand<'_, 'c> {
         craniotomy::look(self.surgery.region())
     }
 
-    fn build(&mut self, _hand: &ToolGrip<'c>) -> Result<Scene, RunError> {
+    fn build(&self, _hand: &ToolGrip<'c>) -> Result<Scene, RunError> {
+        Ok(self.patient.build(self.args.way.simd())?)
+    }
+
+    fn begin_anew(&mut self, _hand: &ToolGrip<'c>) {
         if let [Some(one), Some(other)] = self.surgery.unlink() {
             self.unlinked = Some([one, other]);
         }
         self.surgery = Surgery::new(self.patient, self.args.step);
         self.next_score = 0;
-        Ok(self.patient.build(self.args.way.simd())?)
     }
 
     fn apply(
@@ -89,25 +92,34 @@ impl<'c> Scenario for CraniotomyAtHand<'_, 'c> {
         _hand: &ToolGrip<'c>,
         manager: &mut VeManager,
         _recording: &mut Recording<'_>,
-    ) -> Result<(), RunError> {
+    ) {
         // By now the devices are where the tools are.
         if self.is_free(manager)
             && let Some(ends) = self.unlinked.take()
         {
             (0..).zip(ends).for_each(|(hand, end)| self.surgery.link(hand, end));
         }
-        Ok(())
     }
 
     fn advance(
         &mut self,
         view: &mut View<ToolGrip<'c>>,
-        manager: VeManager,
+        manager: &mut VeManager,
         recording: &mut Recording<'_>,
         frames: u64,
-        host: (&mut OnFrame<'_>, Manage<'_>),
+        on_frame: &mut OnFrame<'_>,
+    ) -> Result<(), ExecutorError> {
+        self.surgery.advance(manager, recording, frames, view, on_frame)
+    }
+
+    fn tend(
+        &mut self,
+        view: &mut View<ToolGrip<'c>>,
+        manager: VeManager,
+        recording: &mut Recording<'_>,
+        manage: Manage<'_>,
     ) -> Result<VeManager, RunError> {
-        let manager = self.surgery.advance(manager, recording, frames, view, host)?;
+        let manager = self.surgery.look(manager, recording, manage)?;
         view.hand.is_free = self.is_free(&manager);
         if manager.frame() >= self.next_score {
             view.hand.score = self.surgery.score(&manager);

@@ -6,7 +6,7 @@ mod physics;
 use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::look::Look;
 use dualframe_sim::blocking::Grain;
-use dualframe_sim::executor::OnFrame;
+use dualframe_sim::executor::{ExecutorError, OnFrame};
 use dualframe_sim::manager::VeManager;
 use dualframe_sim::message::Message;
 use dualframe_sim::object::ObjectId;
@@ -59,22 +59,20 @@ impl Scenario for ParticlesAtHand<'_> {
         particles::look(particles::scene_of(self.args, self.objects).room())
     }
 
-    fn build(&mut self, hand: &Grip) -> Result<Scene, RunError> {
-        self.objects = hand.physics.objects;
-        let mut scene = particles::scene_of(self.args, self.objects).build()?;
+    fn build(&self, hand: &Grip) -> Result<Scene, RunError> {
+        let mut scene = particles::scene_of(self.args, hand.physics.objects).build()?;
         scene.stages.simd = self.args.way.simd();
         scene.stages.gravity = Vec3::NEG_Y * hand.physics.gravity;
-        // They are as they are built, and are told what is set otherwise.
-        self.applied = Physics { gravity: hand.physics.gravity, ..Physics::new(self.args) };
         Ok(scene)
     }
 
-    fn apply(
-        &mut self,
-        hand: &Grip,
-        manager: &mut VeManager,
-        recording: &mut Recording<'_>,
-    ) -> Result<(), RunError> {
+    fn begin_anew(&mut self, hand: &Grip) {
+        self.objects = hand.physics.objects;
+        // They are as they are built, and are told what is set otherwise.
+        self.applied = Physics { gravity: hand.physics.gravity, ..Physics::new(self.args) };
+    }
+
+    fn apply(&mut self, hand: &Grip, manager: &mut VeManager, recording: &mut Recording<'_>) {
         let (now, before) = (hand.physics, self.applied);
         self.applied = now;
         if now.gravity != before.gravity {
@@ -87,18 +85,26 @@ impl Scenario for ParticlesAtHand<'_> {
         if now.damping != before.damping {
             self.tell_all(manager, || Message::Damping(now.damping));
         }
-        Ok(())
     }
 
     fn advance(
         &mut self,
         view: &mut View<Grip>,
-        mut manager: VeManager,
+        manager: &mut VeManager,
         recording: &mut Recording<'_>,
         frames: u64,
-        (on_frame, _): (&mut OnFrame<'_>, Manage<'_>),
+        on_frame: &mut OnFrame<'_>,
+    ) -> Result<(), ExecutorError> {
+        recording.run(manager, frames, view, on_frame)
+    }
+
+    fn tend(
+        &mut self,
+        _view: &mut View<Grip>,
+        manager: VeManager,
+        _recording: &mut Recording<'_>,
+        _manage: Manage<'_>,
     ) -> Result<VeManager, RunError> {
-        recording.run(&mut manager, frames, view, on_frame)?;
         Ok(manager)
     }
 }
