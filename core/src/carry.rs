@@ -122,6 +122,12 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         self.announce();
     }
 
+    /// Gives what is carried to whoever comes first, and calls for all that was queued.
+    pub(crate) fn let_go(&mut self) {
+        self.shed();
+        self.announce();
+    }
+
     /// Carries `work`, if there is room for it.
     #[inline]
     fn carry(&mut self, work: Work) -> bool {

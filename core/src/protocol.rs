@@ -285,6 +285,10 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
             self.ready(unit, out);
         }
         if self.window.renders.arrive() {
+            // A swap may take long, waiting for a display say: nothing is to wait for it that others could do.
+            if !seeded!(SwapsWithWork) {
+                out.let_go();
+            }
             outcome = outcome.and(env.swap(frame, renderer));
             self.window.swapped(frame);
             self.after_swap(frame, out);
