@@ -56,8 +56,8 @@ pub(crate) struct Window {
     display: CachePadded<Atomic>,
     /// The last frame that was opened, for the stamps of letters from outside.
     open: CachePadded<Atomic>,
-    /// The first frame that is not to be entered. Written only by `&mut` access.
-    pub(crate) limit: Frame,
+    /// The first frame that is not to be entered, if there is one. Written only by `&mut` access.
+    pub(crate) limit: Option<Frame>,
     units: u32,
 }
 
@@ -68,9 +68,15 @@ impl Window {
             renders: CachePadded::new(Countdown::new(units)),
             display: CachePadded::new(Atomic::new(first.0)),
             open: CachePadded::new(Atomic::new(first.previous().0)),
-            limit: first,
+            limit: Some(first),
             units,
         }
+    }
+
+    /// Whether `frame` is the first that is not to be entered.
+    #[inline]
+    pub(crate) fn is_limit(&self, frame: Frame) -> bool {
+        self.limit == Some(frame)
     }
 
     /// The frame that may be rendered now.

@@ -254,7 +254,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
 
     /// Lets `unit`, done with `frame`, enter the next one, if there is to be one.
     fn advance(&self, unit: UnitId, frame: Frame, out: &mut Carry<'_, '_, E, W>) {
-        if frame.next() == self.window.limit {
+        if self.window.is_limit(frame.next()) {
             return;
         }
         if self.tables.unit(unit).bypasses {
@@ -297,7 +297,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
     }
 
     fn after_swap(&self, frame: Frame, out: &mut Carry<'_, '_, E, W>) {
-        if frame.next() == self.window.limit {
+        if self.window.is_limit(frame.next()) {
             // Whoever sleeps shall see that the pipeline is at rest.
             if !seeded!(EndNotAnnounced) {
                 out.all_done();

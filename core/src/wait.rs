@@ -144,6 +144,11 @@ impl Bells {
         }
     }
 
+    /// Nobody is hungry: by exclusive access no worker is left, though one that was forgotten may be counted still.
+    pub(crate) fn forget_hunger(&mut self) {
+        self.hungry.store(0, site::EXCLUSIVE);
+    }
+
     /// Announces `any` work units that every worker can do, and `renders` that only holders can.
     ///
     /// As many sleepers are woken at once as there is work for, not one by one in a chain; a
