@@ -38,7 +38,8 @@ impl Frame {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Entry {
     /// As soon as it is updated: its rendering overlaps with the next frame's detection, since
-    /// both only read it. Two frames in flight.
+    /// both only read it. Two frames in flight; units that are done with the second may be tested and interact
+    /// for a third before the first is swapped, but no update of that comes before.
     #[default]
     AfterUpdate,
     /// When it is rendered, as in the paper (Fig. 6). Two frames in flight.

@@ -1,5 +1,5 @@
 //! The dual-frame four-stage pipeline: broad phase, interaction, update, render, at most two
-//! consecutive frames in flight, and workers that migrate to wherever work lies.
+//! consecutive frames in flight, each from its first update to its swap, and workers that migrate to wherever work lies.
 //!
 //! # Realtime contract
 //!

@@ -12,7 +12,8 @@ pub trait Waiting: Sync {
     /// Returns once `bell` has been rung past `seen`; may return earlier.
     fn sleep(&self, bell: &Bell, seen: Epoch);
 
-    /// Wakes up to `count` workers that sleep on `bell`. Called after the bell's epoch moved on.
+    /// Wakes at least `count` of the workers that sleep on `bell`, or all if they are fewer; to wake more does no
+    /// harm. Called after the bell's epoch moved on.
     fn wake(&self, bell: &Bell, count: u32);
 }
 
