@@ -5,15 +5,14 @@
 use std::sync::{Condvar, Mutex, MutexGuard};
 use std::time::Duration;
 
-use dualframe_core::contacts::{ContactSlot, Contacts, SegmentSlot};
+use dualframe_core::contacts::Contacts;
 use dualframe_core::environment::{Environment, Pair};
 use dualframe_core::error::TableFull;
 use dualframe_core::frame::{Entry, Frame};
-use dualframe_core::inbox::LetterSlot;
 use dualframe_core::inputs::Inputs;
 use dualframe_core::pipeline::{Config, Pipeline};
 use dualframe_core::ring::QueueSlot;
-use dualframe_core::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
+use dualframe_core::storage::{Memory, UnitSlot, queue_slots};
 use dualframe_core::unit::UnitId;
 use dualframe_core::wait::{Bell, Epoch, Waiting};
 use dualframe_core::worker::Step;
@@ -123,10 +122,10 @@ fn swaps_while_another_sleeps(entry: Entry, home: u32) {
     let display = Display(&clock);
     let memory = Memory {
         units: &mut [UnitSlot::new(())],
-        interactions: &mut [const { InteractionSlot::spare(()) }; 0],
-        contacts: &mut [const { ContactSlot::new() }; 0],
-        segments: &mut [const { SegmentSlot::new() }; 0],
-        letters: &mut [const { LetterSlot::new() }; 0],
+        interactions: &mut [],
+        contacts: &mut [],
+        segments: &mut [],
+        letters: &mut [],
         queues: &mut [const { QueueSlot::new() }; queue_slots(1, 0, 0, 2)],
     };
     let config = Config { entry, homes: 2, ..Config::default() };
