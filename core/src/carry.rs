@@ -11,20 +11,6 @@ use crate::tables::Home;
 use crate::unit::{InteractionId, UnitId, Work};
 use crate::wait::Waiting;
 
-/// Takes what a work unit sets free.
-pub(crate) trait Outputs {
-    /// `work` can be done now, by this worker too.
-    fn emit(&mut self, work: Work);
-    /// `work` is for whoever comes for it first: this worker cannot do it now, or is not to keep it.
-    fn queue(&mut self, work: Work);
-    /// Renderings that were queued already can be done now, by other holders if there are any.
-    fn renders_visible(&mut self);
-    /// The pipeline is at rest.
-    fn all_done(&mut self);
-    /// Whether this worker has the shared renderer, or has it from now on, since nobody else had it.
-    fn takes_renderer(&mut self) -> bool;
-}
-
 /// Interactions, and other work units, that a worker may carry at once: more than one block has neighbours,
 /// so that a unit's interactions need no queue. Usually 32; beyond it they are queued.
 #[cfg(not(loom))]
@@ -79,6 +65,43 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         matches!(self.works.last(), Some(Work::Render(_)))
     }
 
+    /// `work` can be done now, by this worker too.
+    #[inline]
+    pub(crate) fn emit(&mut self, work: Work) {
+        if matches!(work, Work::Update(unit) if self.is_at_home_elsewhere(unit)) {
+            self.queue(work);
+            return;
+        }
+        // One work unit is for this worker itself.
+        if (!self.is_empty() && self.pipeline.bells.somebody_is_hungry()) || !self.carry(work) {
+            self.queue(work);
+        }
+    }
+
+    /// `work` is for whoever comes for it first: this worker cannot do it now, or is not to keep it.
+    #[inline]
+    pub(crate) fn queue(&mut self, work: Work) {
+        self.pipeline.push(work);
+        *self.calls_for(Stage::of(work)) += 1;
+    }
+
+    /// Renderings that were queued already can be done now, by other holders if there are any.
+    pub(crate) fn renders_visible(&mut self) {
+        self.renders = u32::MAX / 2;
+    }
+
+    /// The pipeline is at rest.
+    pub(crate) fn all_done(&mut self) {
+        (self.queued, self.renders) = (u32::MAX / 2, u32::MAX / 2);
+    }
+
+    /// Whether this worker has the shared renderer, or has it from now on, since nobody else had it.
+    #[inline]
+    pub(crate) fn takes_renderer(&mut self) -> bool {
+        self.renders_shared = self.renders_shared || self.pipeline.shared.take();
+        self.renders_shared
+    }
+
     /// Gives what is carried to whoever comes first.
     fn shed(&mut self) {
         while let Some(id) = self.interactions.pop_front() {
@@ -96,6 +119,12 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         if !self.is_empty() && self.pipeline.bells.somebody_is_hungry() {
             self.shed();
         }
+        self.announce();
+    }
+
+    /// Gives what is carried to whoever comes first, and calls for all that was queued.
+    pub(crate) fn let_go(&mut self) {
+        self.shed();
         self.announce();
     }
 
@@ -262,40 +291,6 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
             self.pipeline.bells.announce(&self.pipeline.waiting, self.queued, self.renders);
             (self.queued, self.renders) = (0, 0);
         }
-    }
-}
-
-impl<E: Environment, W: Waiting> Outputs for Carry<'_, '_, E, W> {
-    #[inline]
-    fn emit(&mut self, work: Work) {
-        if matches!(work, Work::Update(unit) if self.is_at_home_elsewhere(unit)) {
-            self.queue(work);
-            return;
-        }
-        // One work unit is for this worker itself.
-        if (!self.is_empty() && self.pipeline.bells.somebody_is_hungry()) || !self.carry(work) {
-            self.queue(work);
-        }
-    }
-
-    #[inline]
-    fn queue(&mut self, work: Work) {
-        self.pipeline.push(work);
-        *self.calls_for(Stage::of(work)) += 1;
-    }
-
-    fn renders_visible(&mut self) {
-        self.renders = u32::MAX / 2;
-    }
-
-    fn all_done(&mut self) {
-        (self.queued, self.renders) = (u32::MAX / 2, u32::MAX / 2);
-    }
-
-    #[inline]
-    fn takes_renderer(&mut self) -> bool {
-        self.renders_shared = self.renders_shared || self.pipeline.shared.take();
-        self.renders_shared
     }
 }
 

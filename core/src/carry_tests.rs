@@ -102,6 +102,20 @@ fn with_pipeline<'c, R>(
     use_it(Pipeline::new(memory, config, calls).unwrap_or_else(|error| panic!("{error}")))
 }
 
+#[test]
+fn a_run_begins_with_nobody_hungry() {
+    let calls = Calls::default();
+    let void = Void { calls: &calls, before_entry: AtomicU32::new(0) };
+    with_pipeline(&calls, 1, |mut pipeline| {
+        let mut worker = pipeline.worker();
+        assert_eq!(worker.step(&void), Ok(Step::Idle));
+        ::core::mem::forget(worker);
+        assert!(pipeline.bells.somebody_is_hungry());
+        assert_eq!(pipeline.run(1), Ok(()));
+        assert!(!pipeline.bells.somebody_is_hungry());
+    });
+}
+
 /// A holder's step finds a unit in a queue that it may not be rendered from, and another holder looks in vain
 /// meanwhile and is about to sleep. What the step did, the calls at the first entry and after the step.
 fn put_back(frames: u32) -> (Step, u32, u32) {

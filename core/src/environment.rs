@@ -25,6 +25,10 @@ pub struct Pair {
 /// - an object's interactions of a frame all come between its updates of the frame before and of
 ///   that frame; its rendering comes between its updates of that frame and of the next.
 ///
+/// No update of frame f + 2 comes before the swap of frame f. Its tests and interactions may, under
+/// [`Entry::AfterUpdate`](crate::frame::Entry::AfterUpdate): what they count for a frame's swap to read has to be kept
+/// for three frames there, not for two.
+///
 /// A callback that returns an error ends its work unit like one that succeeds: the frame goes on
 /// and the error comes out of [`crate::worker::Worker::step`].
 ///
@@ -56,7 +60,7 @@ pub trait Environment {
     fn broad_phase(&self, a: &Self::Object, b: &Self::Object) -> bool;
 
     /// Whether a unit has an interaction with itself this frame: a block's objects with each
-    /// other. Asked by the spatial broad phase only.
+    /// other. Asked by the spatial broad phase only, and not of solitary units.
     fn interacts_within(&self, _block: &Self::Object) -> bool {
         false
     }

@@ -38,7 +38,8 @@ impl Frame {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Entry {
     /// As soon as it is updated: its rendering overlaps with the next frame's detection, since
-    /// both only read it. Two frames in flight.
+    /// both only read it. Two frames in flight; units that are done with the second may be tested and interact
+    /// for a third before the first is swapped, but no update of that comes before.
     #[default]
     AfterUpdate,
     /// When it is rendered, as in the paper (Fig. 6). Two frames in flight.
@@ -56,8 +57,8 @@ pub(crate) struct Window {
     display: CachePadded<Atomic>,
     /// The last frame that was opened, for the stamps of letters from outside.
     open: CachePadded<Atomic>,
-    /// The first frame that is not to be entered. Written only by `&mut` access.
-    pub(crate) limit: Frame,
+    /// The first frame that is not to be entered, if there is one. Written only by `&mut` access.
+    pub(crate) limit: Option<Frame>,
     units: u32,
 }
 
@@ -68,9 +69,15 @@ impl Window {
             renders: CachePadded::new(Countdown::new(units)),
             display: CachePadded::new(Atomic::new(first.0)),
             open: CachePadded::new(Atomic::new(first.previous().0)),
-            limit: first,
+            limit: Some(first),
             units,
         }
+    }
+
+    /// Whether `frame` is the first that is not to be entered.
+    #[inline]
+    pub(crate) fn is_limit(&self, frame: Frame) -> bool {
+        self.limit == Some(frame)
     }
 
     /// The frame that may be rendered now.

@@ -60,6 +60,8 @@ faults! {
     PendingArmedLate;
     /// Trap 3: a unit is rendered before the frame before is swapped.
     RenderedBeforeSwap;
+    /// Whoever swaps keeps what it carries, and calls for what it queued afterwards.
+    SwapsWithWork;
     /// Trap 4: an interaction may end before it is counted.
     CountedAfterEmitted;
     /// Trap 4: an interaction is counted at one end only.

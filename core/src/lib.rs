@@ -1,5 +1,5 @@
 //! The dual-frame four-stage pipeline: broad phase, interaction, update, render, at most two
-//! consecutive frames in flight, and workers that migrate to wherever work lies.
+//! consecutive frames in flight, each from its first update to its swap, and workers that migrate to wherever work lies.
 //!
 //! # Realtime contract
 //!
@@ -8,8 +8,9 @@
 //! allocate, built with overflow checks off, as releases are). One [`worker::Worker::step`] does at
 //! most one work unit: its own cost is a bounded number of atomic operations (`PROTOCOL.md` §8), except
 //! that a compare-and-swap is retried when another worker succeeded at the same word meanwhile. A worker
-//! that is suspended anywhere holds back only the work unit in its hand and what it carries (64 others at
-//! most, and the shared renderer while it has it); every queue stays usable. A full table is a returned error
+//! that is suspended anywhere holds back only the work unit in its hand, what it carries (64 others at
+//! most, and the shared renderer while it has it) and calls for what it has queued in this step; in a swap it
+//! carries nothing and owes no call. Every queue stays usable. A full table is a returned error
 //! that names the capacity needed. Waiting is the host's ([`wait::Waiting`]).
 //!
 //! # One idea

@@ -87,11 +87,25 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     /// # Errors
     /// [`StillRunning`] if the frames let run before have not all been swapped.
     pub fn run(&mut self, frames: u32) -> Result<(), StillRunning> {
+        self.run_up_to(Some(Frame(self.frame().0.wrapping_add(frames))))
+    }
+
+    /// Lets frames run without end: for a machine that never stops, or whose pipeline is shared for good, so that
+    /// nobody can let more frames run. Who wants an end steps no worker any more.
+    ///
+    /// # Errors
+    /// [`StillRunning`] if the frames let run before have not all been swapped.
+    pub fn run_without_end(&mut self) -> Result<(), StillRunning> {
+        self.run_up_to(None)
+    }
+
+    fn run_up_to(&mut self, limit: Option<Frame>) -> Result<(), StillRunning> {
         if !self.finished() {
             return Err(StillRunning);
         }
-        if frames > 0 {
-            self.window.limit = Frame(self.window.limit.0.wrapping_add(frames));
+        self.bells.forget_hunger();
+        self.window.limit = limit;
+        if !self.finished() {
             let units = 0..self.tables.units.len() as u32;
             units.for_each(|unit| self.push(Work::Enter(UnitId(unit))));
         }
@@ -149,7 +163,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
 
     /// Whether every frame that was let run has been swapped.
     pub fn finished(&self) -> bool {
-        self.window.display() == self.window.limit
+        self.window.is_limit(self.window.display())
     }
 
     /// The first frame that has not been swapped.

@@ -81,8 +81,8 @@ impl Environment for Calendar {
     }
 }
 
-/// Runs `frames` frames from `first` on, which is even, by two workers in turn.
-fn run_from(first: Frame, frames: u32, config: Config) {
+/// Runs `frames` frames from `first` on, which is even, by two workers in turn; the run then ends or does not.
+fn run_from(first: Frame, frames: u32, ends: bool, config: Config) {
     let mut modelled = [InteractionSlot::between(UnitId(0), UnitId(1), None)];
     let mut spare = [const { InteractionSlot::spare(None) }; 2];
     let memory = Memory {
@@ -100,20 +100,25 @@ fn run_from(first: Frame, frames: u32, config: Config) {
         Pipeline::new(memory, config, Spin).unwrap_or_else(|error| panic!("{error}"));
     pipeline.window = Window::new(2, first);
     pipeline.tables.units.iter().for_each(|unit| unit.frame.store(first.0, site::EXCLUSIVE));
-    assert_eq!(pipeline.run(frames), Ok(()));
+    let runs = if ends { pipeline.run(frames) } else { pipeline.run_without_end() };
+    assert_eq!(runs, Ok(()));
+    assert_eq!(pipeline.window.limit.is_some(), ends);
+    let end = Frame(first.0.wrapping_add(frames));
     let calendar = Calendar { first };
     let mut workers = [pipeline.worker(), pipeline.worker()];
     assert!(pipeline.token(first).is_ok_and(|token| workers[0].hold(token).is_ok()));
     let mut idle = 0;
-    while !pipeline.finished() {
+    while pipeline.frame() != end {
         for worker in &mut workers {
             let did = worker.step(&calendar).unwrap_or_else(|full| panic!("{full}"));
             idle = if did == Step::Idle { idle + 1 } else { 0 };
         }
         assert!(idle < 4, "unfinished at {:?}, and no work to be seen", pipeline.frame());
     }
-    let swapped = workers[0].renderer().map(|next| *next);
-    assert_eq!(swapped, Some(Frame(first.0.wrapping_add(frames))));
+    assert_eq!(workers[0].renderer().map(|next| *next), Some(end));
+    assert_eq!(pipeline.finished(), ends);
+    drop(workers);
+    assert_eq!(pipeline.run(0), if ends { Ok(()) } else { Err(StillRunning) });
 }
 
 #[test]
@@ -121,7 +126,9 @@ fn frames_wrap() {
     for broad_phase in [BroadPhase::Spatial, BroadPhase::Pairwise] {
         for entry in [Entry::AfterUpdate, Entry::AfterRender, Entry::AfterSwap] {
             let config = Config { broad_phase, entry, ..Config::default() };
-            run_from(Frame(u32::MAX - 3), 8, config);
+            for ends in [true, false] {
+                run_from(Frame(u32::MAX - 3), 8, ends, config);
+            }
         }
     }
 }

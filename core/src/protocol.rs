@@ -5,7 +5,7 @@
 
 use heapless::Vec;
 
-use crate::carry::Outputs;
+use crate::carry::Carry;
 use crate::contacts::Contacts;
 use crate::environment::{Environment, Pair};
 use crate::error::TableFull;
@@ -27,7 +27,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         &self,
         env: &E,
         unit: UnitId,
-        out: &mut impl Outputs,
+        out: &mut Carry<'_, '_, E, W>,
     ) -> Result<(), TableFull> {
         let found = if self.tables.unit(unit).bypasses {
             Ok(())
@@ -46,7 +46,12 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
 
     /// Tests `unit` against every earlier arrival. A table that is full is reported once,
     /// with the last refusal's need; the frame goes on without the pairs that did not fit.
-    fn meet_earlier(&self, env: &E, unit: UnitId, out: &mut impl Outputs) -> Result<(), TableFull> {
+    fn meet_earlier(
+        &self,
+        env: &E,
+        unit: UnitId,
+        out: &mut Carry<'_, '_, E, W>,
+    ) -> Result<(), TableFull> {
         let slot = self.tables.unit(unit);
         let mut outcome = Ok(());
         let mut found = Batch::new();
@@ -81,7 +86,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         &self,
         unit: UnitId,
         others: &[UnitId],
-        out: &mut impl Outputs,
+        out: &mut Carry<'_, '_, E, W>,
     ) -> Result<(), TableFull> {
         if others.is_empty() {
             return Ok(());
@@ -98,7 +103,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
     }
 
     /// Arrives at every modelled interaction of `unit` and tests those whose other end is there.
-    fn meet_modelled(&self, env: &E, unit: UnitId, out: &mut impl Outputs) {
+    fn meet_modelled(&self, env: &E, unit: UnitId, out: &mut Carry<'_, '_, E, W>) {
         let mut next = self.tables.unit(unit).modelled.load(site::LIST_FOLLOW);
         let mut found = Batch::new();
         while next != NONE {
@@ -123,7 +128,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
     }
 
     /// Counts interactions of `unit` at both ends before anyone can end them, then lets them go.
-    fn candidates(&self, unit: UnitId, ids: &[InteractionId], out: &mut impl Outputs) {
+    fn candidates(&self, unit: UnitId, ids: &[InteractionId], out: &mut Carry<'_, '_, E, W>) {
         if ids.is_empty() {
             return;
         }
@@ -144,7 +149,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
 
     /// `unit` has entered its frame and made its tests. The last one opens the frame: whatever
     /// has no interactions left, and is rendered, can be updated.
-    fn leave_gate(&self, unit: UnitId, out: &mut impl Outputs) {
+    fn leave_gate(&self, unit: UnitId, out: &mut Carry<'_, '_, E, W>) {
         // Read before leaving: afterwards the unit may be updated by someone else.
         let frame = self.next_frame(unit);
         if seeded!(UpdatesAfterOwnTests) {
@@ -177,7 +182,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
 
     /// One thing less that `unit`'s update waits for.
     #[inline]
-    fn ready(&self, unit: UnitId, out: &mut impl Outputs) {
+    fn ready(&self, unit: UnitId, out: &mut Carry<'_, '_, E, W>) {
         if self.tables.unit(unit).pending.arrive() {
             out.emit(Work::Update(unit));
         }
@@ -188,7 +193,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         &self,
         env: &E,
         id: InteractionId,
-        out: &mut impl Outputs,
+        out: &mut Carry<'_, '_, E, W>,
     ) -> Result<(), E::Error> {
         let slot = self.tables.interaction(id);
         let [a, b] = slot.ends();
@@ -218,7 +223,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         env: &E,
         unit: UnitId,
         holder: bool,
-        out: &mut impl Outputs,
+        out: &mut Carry<'_, '_, E, W>,
     ) -> Result<(), E::Error> {
         let slot = self.tables.unit(unit);
         let frame = self.next_frame(unit);
@@ -248,8 +253,8 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
     }
 
     /// Lets `unit`, done with `frame`, enter the next one, if there is to be one.
-    fn advance(&self, unit: UnitId, frame: Frame, out: &mut impl Outputs) {
-        if frame.next() == self.window.limit {
+    fn advance(&self, unit: UnitId, frame: Frame, out: &mut Carry<'_, '_, E, W>) {
+        if self.window.is_limit(frame.next()) {
             return;
         }
         if self.tables.unit(unit).bypasses {
@@ -265,7 +270,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         env: &E,
         unit: UnitId,
         renderer: &mut E::Renderer,
-        out: &mut impl Outputs,
+        out: &mut Carry<'_, '_, E, W>,
     ) -> Result<(), E::Error> {
         let frame = self.rendered_frame(unit);
         // SAFETY: the unit's next update waits for the arrival below; until then it is only read.
@@ -280,6 +285,10 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
             self.ready(unit, out);
         }
         if self.window.renders.arrive() {
+            // A swap may take long, waiting for a display say: nothing is to wait for it that others could do.
+            if !seeded!(SwapsWithWork) {
+                out.let_go();
+            }
             outcome = outcome.and(env.swap(frame, renderer));
             self.window.swapped(frame);
             self.after_swap(frame, out);
@@ -287,8 +296,8 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         outcome
     }
 
-    fn after_swap(&self, frame: Frame, out: &mut impl Outputs) {
-        if frame.next() == self.window.limit {
+    fn after_swap(&self, frame: Frame, out: &mut Carry<'_, '_, E, W>) {
+        if self.window.is_limit(frame.next()) {
             // Whoever sleeps shall see that the pipeline is at rest.
             if !seeded!(EndNotAnnounced) {
                 out.all_done();

@@ -60,8 +60,8 @@ impl<O> UnitSlot<O> {
     }
 
     const_fn! {
-        /// A unit that never interacts with others: it bypasses the first two stages (§5.1). Under
-        /// modelled interactions every unit without any does, whether made so or not.
+        /// A unit that never interacts, neither with others nor within itself: it bypasses the first two stages
+        /// (§5.1). Under modelled interactions every unit without any does, whether made so or not.
         pub const fn solitary(object: O) -> Self {
             let mut slot = Self::new(object);
             slot.solitary = true;
@@ -104,7 +104,8 @@ pub(crate) enum Chain {
 
 impl<I> InteractionSlot<I> {
     const_fn! {
-        /// An interaction between `a` and `b`, modelled by the host, with its own state.
+        /// An interaction between `a` and `b`, modelled by the host, with its own state. A pipeline with the
+        /// spatial broad phase overwrites the ends: make its slots anew for a pairwise one.
         pub const fn between(a: UnitId, b: UnitId, state: I) -> Self {
             Self {
                 state: Cell::new(state),
@@ -176,7 +177,8 @@ pub struct Memory<'m, E: Environment> {
     pub contacts: &'m mut [ContactSlot<E::Contact>],
     /// As many as `contacts`.
     pub segments: &'m mut [SegmentSlot],
-    /// As many as letters may be under way at once.
+    /// As many as are posted in two frames, from outside too: those of a frame are read by the updates of the
+    /// next, some of which have posted theirs by then.
     pub letters: &'m mut [LetterSlot<E::Message>],
     /// [`queue_slots`] of the numbers above and of homes.
     pub queues: &'m mut [QueueSlot],

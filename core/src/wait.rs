@@ -12,7 +12,8 @@ pub trait Waiting: Sync {
     /// Returns once `bell` has been rung past `seen`; may return earlier.
     fn sleep(&self, bell: &Bell, seen: Epoch);
 
-    /// Wakes up to `count` workers that sleep on `bell`. Called after the bell's epoch moved on.
+    /// Wakes at least `count` of the workers that sleep on `bell`, or all if they are fewer; to wake more does no
+    /// harm. Called after the bell's epoch moved on.
     fn wake(&self, bell: &Bell, count: u32);
 }
 
@@ -142,6 +143,11 @@ impl Bells {
         } else {
             self.hungry.fetch_sub(1, site::HUNGRY);
         }
+    }
+
+    /// Nobody is hungry: by exclusive access no worker is left, though one that was forgotten may be counted still.
+    pub(crate) fn forget_hunger(&mut self) {
+        self.hungry.store(0, site::EXCLUSIVE);
     }
 
     /// Announces `any` work units that every worker can do, and `renders` that only holders can.

@@ -1,6 +1,6 @@
 //! Workers: one step, one work unit (§5.3).
 
-use crate::carry::{Carry, Outputs};
+use crate::carry::Carry;
 use crate::environment::Environment;
 use crate::error::TableFull;
 use crate::migrate::migrate;

@@ -93,6 +93,7 @@ fn pipeline(config: Config) -> Result<(), Failure> {
     let pipeline = black_box(&mut pipeline);
     pipeline.set_homes(|unit| black_box(unit.0));
     shared(pipeline)?;
+    endless(pipeline)?;
     pipeline.take_letters(|unit, from, letter| {
         black_box((unit, from, letter));
     });
@@ -143,6 +144,19 @@ fn shared(pipeline: &mut Pipeline<'_, Ve, Awake>) -> Result<(), Failure> {
         }
     }
     if pipeline.take_back() == Some(FRAMES) { Ok(()) } else { Err(Failure::Wrong) }
+}
+
+/// A run that goes on for as long as somebody steps.
+fn endless(pipeline: &mut Pipeline<'_, Ve, Awake>) -> Result<(), Failure> {
+    pipeline.run_without_end()?;
+    let first = pipeline.frame();
+    let token = pipeline.token(0).map_err(|(_, full)| full)?;
+    let mut worker = pipeline.worker();
+    worker.hold(token).map_err(|_| Failure::Wrong)?;
+    while pipeline.frame().0.wrapping_sub(first.0) < black_box(FRAMES) {
+        turn(&mut worker)?;
+    }
+    if pipeline.finished() { Err(Failure::Wrong) } else { Ok(()) }
 }
 
 fn turn(worker: &mut Worker<'_, '_, Ve, Awake>) -> Result<(), Failure> {

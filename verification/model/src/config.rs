@@ -43,6 +43,8 @@ pub enum Bug {
     SwapByLastButOne,
     /// The next frame is put on display before this one is swapped.
     DisplayedBeforeSwap,
+    /// Whoever swaps keeps what it carries, and calls for what it queued afterwards.
+    SwapsWithWork,
     /// Whatever is queued for rendering is rendered, of whatever frame it is.
     RenderedAhead,
     /// A queue hands out a rendering and keeps it.

@@ -56,7 +56,9 @@ impl Protocol {
             | At::Advancing(_)
             | At::Rendered(_)
             | At::Reentering(_) => carries.iter().for_each(|&carry| may(Act::Go { carry })),
-            At::Ringing | At::Calling | At::Leaving { .. } => self.rings(state, worker, &mut may),
+            At::Ringing | At::RingingToSwap | At::Calling | At::Leaving { .. } => {
+                self.rings(state, worker, &mut may);
+            }
             At::Asleep => {}
             _ => may(Act::Go { carry: false }),
         }
@@ -170,6 +172,9 @@ pub mod property {
     pub const PROGRESS: &str = "7 progress: nobody is stuck while frames are left";
     /// Of the shared renderer: a rendering waits for nobody who does anything else while another sleeps.
     pub const WAKES: &str = "7 progress: no rendering waits for other work while somebody sleeps";
+    /// A swap holds nothing back that others could do.
+    pub const SWAPS: &str =
+        "7 progress: who swaps carries nothing and has called for what it queued";
     /// Not a property that may fail: the model comes to its end.
     pub const FINISHES: &str = "all frames are swapped";
     /// Nor this one: two frames are in flight.
@@ -235,6 +240,7 @@ impl Model for Protocol {
             Property::always(property::WAKES, |model: &Self, state: &State| {
                 state.wakes_for_rendering(&model.0)
             }),
+            Property::always(property::SWAPS, |_, state: &State| state.swaps_empty_handed()),
             Property::sometimes(property::FINISHES, |model: &Self, state: &State| {
                 state.finished(&model.0)
             }),

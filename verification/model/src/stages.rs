@@ -295,6 +295,11 @@ impl Step<'_> {
         if self.config.has(Bug::DisplayedBeforeSwap) {
             self.display_next();
         }
-        self.goes_to(At::Swapping);
+        if self.config.has(Bug::SwapsWithWork) {
+            self.goes_to(At::Swapping);
+        } else {
+            self.shed();
+            self.announce(At::RingingToSwap, At::Swapping);
+        }
     }
 }

@@ -98,6 +98,8 @@ pub enum At {
     Rendered(u8),
     /// Takes the rendering off the frame's.
     Counting,
+    /// Announces what it has queued, and will swap.
+    RingingToSwap,
     /// In the callback of a swap.
     Swapping,
     /// Lets units enter the next frame, from this one on, after a swap.
@@ -345,6 +347,14 @@ impl State {
             |worker: &Worker| worker.is_present() && !sleeps(worker) && !worker.is_at_other_work();
         let waits = config.shared && self.rendering_is_visible();
         !waits || !self.workers.iter().any(sleeps) || self.workers.iter().any(comes)
+    }
+
+    /// Whoever is in a swap, which may take long, carries nothing, and has called for what it queued.
+    pub fn swaps_empty_handed(&self) -> bool {
+        let has_nothing = |worker: &Worker| {
+            worker.carried.is_empty() && (worker.queued, worker.renders) == (0, 0)
+        };
+        self.workers.iter().all(|worker| worker.at != At::Swapping || has_nothing(worker))
     }
 
     /// Invariant 6: no more tokens than there are.

@@ -92,15 +92,20 @@ impl<'c> Step<'c> {
         }
     }
 
-    /// The work unit is done; what it has queued is announced, if anybody may sleep.
+    /// The work unit is done; what it has queued is announced.
     pub(crate) fn end(&mut self) {
+        self.announce(At::Ringing, At::Awake);
+    }
+
+    /// Announces, at `ringing`, what is queued, if anybody may sleep, and goes on to `next`.
+    pub(crate) fn announce(&mut self, ringing: At, next: At) {
         let sleep = self.config.sleep;
         let worker = self.worker();
         let silent = !sleep || worker.queued + worker.renders == 0;
         if silent {
             (worker.queued, worker.renders) = (0, 0);
         }
-        self.goes_to(if silent { At::Awake } else { At::Ringing });
+        self.goes_to(if silent { next } else { ringing });
     }
 
     /// `work` is free: carried, or queued.

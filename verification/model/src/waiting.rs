@@ -101,6 +101,7 @@ impl Step<'_> {
         (worker.queued, worker.renders, worker.at) = (0, 0, At::Awake);
         match leaving {
             At::Calling => worker.at = At::GoingOn,
+            At::RingingToSwap => worker.at = At::Swapping,
             At::Leaving { gone: true } => worker.at = At::Gone,
             At::Leaving { gone: false } => {
                 (worker.holds, worker.offers) = (doubled, true);

@@ -95,6 +95,7 @@ seeded! {
     swap_by_last_but_one: SwapByLastButOne in awake() => property::of(Rule::Swap);
     displayed_before_swap: DisplayedBeforeSwap in Config { tokens: 2, ..awake() }
         => property::of(Rule::Swap);
+    swaps_with_work: SwapsWithWork in sleeping(2) => property::SWAPS;
     rendered_ahead: RenderedAhead in awake() => property::of(Rule::Swap);
     queue_keeps: QueueKeeps in awake() => property::of(Rule::ExactlyOnce);
     wrong_bell: WrongBell in sleeping(3) => property::PROGRESS;

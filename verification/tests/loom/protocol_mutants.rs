@@ -13,6 +13,7 @@ fn killer(fault: Fault) -> &'static str {
         RenderingNotAwaited => "pipeline::spatial_after_update",
         PendingArmedLate => "pipeline::spatial_after_update",
         RenderedBeforeSwap => "pipeline::rendering_waits_for_a_swap",
+        SwapsWithWork => "pipeline::rendering_waits_for_a_swap",
         CountedAfterEmitted => "pipeline::three_pairs",
         CountedAtOneEnd => "pipeline::spatial_after_swap",
         PoolsResetEarly => "pipeline::three_pairs",

@@ -102,7 +102,8 @@ fn sort(n: u32, each: u32) -> u32 {
 /// Each unit has a modelled interaction with each other. `opens`: whether it opens a frame, where nobody interferes; `None` where others do, and it may.
 fn bound(units: u32, did: Did, opens: Option<bool>) -> u32 {
     let find = if opens.is_some() { FIND_ALONE } else { SHARE_RENDERER + FIND };
-    let share = 2 + CARRIED * (1 + PUSH) + ANNOUNCE;
+    let let_go = CARRIED * (1 + PUSH) + ANNOUNCE;
+    let share = 2 + let_go;
     let gate = |opens| if opens { 8 + units * (1 + EMIT) } else { 2 };
     // A solitary unit leaves the gate where others are passed on; there is none where one is alone.
     let pass_on = EMIT + if opens.is_none() { gate(true) } else { 0 };
@@ -121,8 +122,11 @@ fn bound(units: u32, did: Did, opens: Option<bool>) -> u32 {
             let renderer = if opens.is_some() { 0 } else { 2 };
             6 + renderer + candidates + letters + did.posts * (6 + POP) + EMIT + pass_on
         }
-        // Under `Entry::AfterSwap` every unit is passed on.
-        Stage::Render => 5 + (1 + EMIT) + if did.swaps { units * EMIT } else { 0 } + pass_on,
+        // What is carried is queued ahead of a swap; under `Entry::AfterSwap` every unit is passed on behind it.
+        Stage::Render => {
+            let swap = if did.swaps { let_go + units * EMIT } else { 0 };
+            5 + (1 + EMIT) + swap + pass_on
+        }
     };
     find + share + 3 + work + ANNOUNCE
 }

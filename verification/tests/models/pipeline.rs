@@ -170,7 +170,8 @@ fn two_workers(
 
 fn run(name: &str, broad_phase: BroadPhase, entry: Entry) {
     // What each entry forbids is not among them. Who renders a unit last also swaps, and does so
-    // before it does anything else: of two units, none is met in between.
+    // before it does anything else. What it let go another worker may meet in between, but those steps
+    // touch nothing that the swap does, and loom does not vary their order.
     let overlaps = match entry {
         Entry::AfterUpdate => &[AfterSwap, BeforeSwap, BeforeRender][..],
         Entry::AfterRender => &[AfterSwap],
@@ -312,7 +313,8 @@ fn two_holders_at_a_swap() {
 }
 
 /// One holder renders the frame's last unit and swaps while another goes on with the next frame: what
-/// that one updates it may not render before the swap, however long that takes.
+/// that one updates it may not render before the swap, however long that takes. It may update both units before that:
+/// who swaps has let go what it carried.
 fn rendering_waits_for_a_swap() {
     let [update, render] = [Stage::Update, Stage::Render].map(Step::Worked);
     let idle = Step::Idle;
@@ -323,6 +325,7 @@ fn rendering_waits_for_a_swap() {
         [render, update],
         [update, idle],
         [update, render],
+        [update, update],
     ];
     let expected = expected.map(|did| format!("{did:?}"));
     check("pipeline::rendering_waits_for_a_swap", Some(2), 2, expected, |order| {
