@@ -71,11 +71,13 @@ impl LocalModel {
         if finite { Ok(self) } else { Err(ModelError::NonFinite) }
     }
 
-    /// The same beside something that pulls both ways, of which `other` is a model without a normal.
+    /// The same beside something that pulls both ways, of which `other` is a model without a normal; as old as the older
+    /// one.
     #[must_use]
     pub fn beside(self, other: &Self) -> Self {
         let pull = self.pull + other.force_at(self.position);
-        Self { pull, pull_gradient: self.pull_gradient + other.gradient, ..self }
+        let pull_gradient = self.pull_gradient + other.gradient;
+        Self { pull, pull_gradient, time: self.time.min(other.time), ..self }
     }
 
     /// The model's force at a place, in newtons: Eq. 1, and nothing where a contact would pull.
@@ -213,7 +215,9 @@ mod tests {
             position: Vec3::Y * 1e-3,
             ..LocalModel::FREE
         };
-        let both = wall(1_000.0).beside(&held);
+        let both = LocalModel { time: 2.0, ..wall(1_000.0) };
+        let both = both.beside(&LocalModel { time: 1.5, ..held });
+        assert_eq!(both.time, 1.5);
         for model in [both, *Bounded::new(both, &SimulatedDevice::DESCRIPTION).model()] {
             let force = model.force_at(Vec3::ZERO);
             assert!(force.abs_diff_eq(Vec3::new(0.5, 0.8, 0.0), 1e-5), "{force} inside");

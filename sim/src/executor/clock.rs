@@ -11,12 +11,14 @@ use crate::timeline::Timeline;
 /// Of so many frames one is timed; usually 31. Reading the system's clock takes some 50 ns, and with one object a unit
 /// every work unit is a change of stage: timing every frame would cost more than synchronising it, and so it would with
 /// executors that time each block. A number without common divisors with the frames of a batch, so that its first ones
-/// are timed no more often than others; nor is an environment's first one, whose memory nobody has touched yet.
+/// are timed no more often than others; an environment's first one, whose memory nobody has touched yet, is not.
 const FRAMES_PER_SAMPLE: u64 = 31;
+/// The first of them; usually 2, so that short runs have one, too.
+const FIRST_SAMPLE: u64 = 2;
 
 /// Whether a frame is timed that is not recorded on a timeline.
 pub(super) fn is_sampled(frame: u64) -> bool {
-    frame % FRAMES_PER_SAMPLE == FRAMES_PER_SAMPLE / 2
+    frame % FRAMES_PER_SAMPLE == FIRST_SAMPLE
 }
 
 /// Seconds that one worker spent in each stage, shared out as in the frames that were timed: one of 31, or all that a

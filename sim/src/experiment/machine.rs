@@ -13,7 +13,7 @@ pub struct Machine {
     pub processor: String,
     /// The hardware threads that this process may use, a worker each.
     pub threads: usize,
-    /// The machine's cores, where the system says: of one core two hardware threads get less done than two cores.
+    /// The cores that these are of, where the system says: two hardware threads of one core get less done than two cores.
     pub cores: Option<usize>,
     /// The operating system.
     pub system: &'static str,
@@ -55,13 +55,16 @@ impl fmt::Display for Machine {
     }
 }
 
-/// How many cores Linux says that there are: hardware threads that name different siblings. Other systems are not asked.
+/// How many cores this process may use, as Linux tells: hardware threads that name different siblings. Other systems are
+/// not asked.
 fn physical_cores() -> Option<usize> {
-    let threads = fs::read_dir("/sys/devices/system/cpu").ok()?.flatten();
-    let siblings = threads.map(|thread| thread.path().join("topology/thread_siblings_list"));
-    let cores: HashSet<String> =
-        siblings.filter_map(|list| fs::read_to_string(list).ok()).collect();
-    (!cores.is_empty()).then_some(cores.len())
+    let siblings = core_affinity::get_core_ids()?.into_iter().map(|thread| {
+        let list =
+            format!("/sys/devices/system/cpu/cpu{}/topology/thread_siblings_list", thread.id);
+        fs::read_to_string(list).ok()
+    });
+    let cores: Option<HashSet<String>> = siblings.collect();
+    cores.map(|cores| cores.len())
 }
 
 /// What Linux says of the processor; other systems are not asked.

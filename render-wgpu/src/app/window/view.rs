@@ -59,6 +59,7 @@ pub(in crate::app) struct View<H> {
     /// Whether the frame being drawn is shown. Displays show fewer frames than are computed.
     is_shown: bool,
     pace: Pace,
+    is_display_gone: bool,
     failure: Option<GraphicsError>,
 }
 
@@ -138,6 +139,7 @@ impl<H: Hand> View<H> {
             mailbox: Mailbox::new(),
             is_shown: true,
             pace,
+            is_display_gone: false,
             failure: None,
         })
     }
@@ -152,8 +154,11 @@ impl<H: Hand> View<H> {
         self.failure.clone().or_else(|| self.painter.failure())
     }
 
-    /// Goes where nothing is drawn any more: frames that are still to come run without it.
+    /// Goes where nothing is drawn any more: frames that are still to come run without it, and without what the person
+    /// held.
     pub(super) fn leave(&mut self) {
+        self.act(Gesture::Release);
+        self.hand.forget();
         self.controls.is_paused = false;
         self.window.set_visible(false);
     }
@@ -170,11 +175,20 @@ impl<H: Hand> View<H> {
 
     /// Does what the person did, after waiting for it for up to `timeout`.
     pub(super) fn attend(&mut self, timeout: Duration) {
+        if self.is_display_gone {
+            return;
+        }
         let pumped = self.event_loop.pump_app_events(Some(timeout), &mut self.input);
         if let PumpStatus::Exit(_) = pumped {
             // Nobody here ends the loop: it does so itself when there is no display any more.
+            self.is_display_gone = true;
             let reason = "the display is gone".to_owned();
             self.failure.get_or_insert(GraphicsError::Surface { reason });
+        }
+        if self.failure().is_some() {
+            // It may still be closed, where a display lets no window go.
+            self.input.gestures.clear();
+            return;
         }
         let mut gestures = std::mem::take(&mut self.input.gestures);
         for gesture in gestures.drain(..) {
@@ -182,7 +196,7 @@ impl<H: Hand> View<H> {
         }
         // The list keeps its memory.
         self.input.gestures = gestures;
-        if self.failure().is_none() && self.screen.follow(self.painter.gpu(), self.input.size) {
+        if self.screen.follow(self.painter.gpu(), self.input.size) {
             let (width, height) = self.screen.size();
             if let Err(error) = self.painter.resize(width, height) {
                 self.failure = Some(error);
@@ -342,10 +356,10 @@ impl<H: Hand> Renderer for View<H> {
             self.redraw();
         }
         self.is_shown = false;
+        self.attend(Duration::ZERO);
         if self.failure().is_some() {
             return;
         }
-        self.attend(Duration::ZERO);
         self.follow(true);
         self.pace.keep(self.controls.is_real_time);
         // What is taken is drawn: else it would be there still when a last picture is taken.

@@ -2,8 +2,9 @@
 
 use dualframe_core::error::Table;
 use dualframe_core::pipeline::MOST_HOMES;
+use dualframe_core::storage::InteractionSlot;
 
-use super::host::Register;
+use super::host::{Found, Register};
 use super::memory::{Tables, modelled_interactions, spare_interactions};
 use crate::behavior::Room;
 use crate::block::Block;
@@ -34,19 +35,9 @@ impl Layout {
         grain: Grain,
         workers: usize,
     ) -> Result<Self, BlockingError> {
-        let (mut blocking, mut blocks) = Blocking::new(objects, grain, workers)?;
         let homes = homes(workers);
-        let interactions = match grain {
-            Grain::Spatial => {
-                blocks.iter_mut().for_each(|block| blocking.drain(block));
-                blocking.deal(homes, 0.0);
-                for (index, block) in blocks.iter_mut().enumerate() {
-                    blocking.fill(index, block);
-                }
-                spare_interactions(&blocks)
-            }
-            Grain::Pairwise => modelled_interactions(stages, &blocks),
-        };
+        let Formed { blocking, blocks, interactions } =
+            Formed::new(objects, stages, (grain, workers), homes)?;
         Ok(Self {
             tables: Tables::new(&blocks, interactions, homes as usize),
             register: Register::new(&blocks),
@@ -59,6 +50,7 @@ impl Layout {
     }
 
     /// Forms more blocks and homes if there are more workers than they are for; fewer work on as many as there are.
+    /// What tables have grown to for objects' contacts and letters they keep.
     ///
     /// # Errors
     /// None but those with which it would not have been made.
@@ -69,9 +61,14 @@ impl Layout {
         grain: Grain,
     ) -> Result<(), BlockingError> {
         if workers > self.workers {
-            let blocks = self.blocks.drain(..);
-            let objects = blocks.flat_map(|block| block.objects).collect();
-            *self = Self::new(objects, stages, grain, workers)?;
+            let homes = homes(workers);
+            let objects = self.blocks.drain(..).flat_map(|block| block.objects).collect();
+            let Formed { blocking, blocks, interactions } =
+                Formed::new(objects, stages, (grain, workers), homes)?;
+            self.tables.model(interactions, blocks.len(), homes as usize);
+            (self.register, self.room) = (Register::new(&blocks), Room::of(blocks.iter()));
+            (self.blocks, self.blocking) = (blocks, blocking);
+            (self.homes, self.workers) = (homes, workers);
         }
         Ok(())
     }
@@ -84,7 +81,37 @@ impl Layout {
     /// Models the interactions anew, of which rules have changed.
     pub(super) fn model(&mut self, stages: &Stages) {
         let interactions = modelled_interactions(stages, &self.blocks);
-        self.tables.model(interactions, self.blocks.len());
+        self.tables.model(interactions, self.blocks.len(), self.homes as usize);
+    }
+}
+
+/// Objects in blocks, dealt to homes, and which of the blocks may interact.
+struct Formed {
+    blocking: Blocking,
+    blocks: Vec<Block>,
+    interactions: Vec<InteractionSlot<Found>>,
+}
+
+impl Formed {
+    fn new(
+        objects: Vec<Object>,
+        stages: &Stages,
+        (grain, workers): (Grain, usize),
+        homes: u32,
+    ) -> Result<Self, BlockingError> {
+        let (mut blocking, mut blocks) = Blocking::new(objects, grain, workers)?;
+        let interactions = match grain {
+            Grain::Spatial => {
+                blocks.iter_mut().for_each(|block| blocking.drain(block));
+                blocking.deal(homes, 0.0);
+                for (index, block) in blocks.iter_mut().enumerate() {
+                    blocking.fill(index, block);
+                }
+                spare_interactions(&blocks)
+            }
+            Grain::Pairwise => modelled_interactions(stages, &blocks),
+        };
+        Ok(Self { blocking, blocks, interactions })
     }
 }
 

@@ -112,9 +112,14 @@ impl Tables {
         }
     }
 
-    /// Replaces the interactions.
-    pub(super) fn model(&mut self, interactions: Vec<InteractionSlot<Found>>, blocks: usize) {
-        self.interactions = interactions;
+    /// Replaces the interactions, of so many blocks in so many homes.
+    pub(super) fn model(
+        &mut self,
+        interactions: Vec<InteractionSlot<Found>>,
+        blocks: usize,
+        homes: usize,
+    ) {
+        (self.interactions, self.homes) = (interactions, homes);
         self.fit_queues(blocks);
     }
 

@@ -253,6 +253,8 @@ impl Executor for PipelineExecutor {
 
 #[cfg(test)]
 mod tests {
+    use dualframe_core::error::Table;
+
     use super::*;
     use crate::executor::state_hash;
     use crate::render::NullRenderer;
@@ -294,9 +296,13 @@ mod tests {
         let (mut grown, mut large) = (executor(scene(), 1), executor(scene(), 8));
         advance(&mut grown, 40);
         assert_eq!((sizes(&grown).1, sizes(&large).1), (1, 8));
+        let room = grown.layout.tables.contact_capacity();
+        grown.layout.grow(Table::Contacts, room);
+        let room = grown.layout.tables.contact_capacity();
         grown.pool.resize(8);
         advance(&mut grown, 40);
         assert_eq!(sizes(&grown), sizes(&large));
+        assert_eq!(grown.layout.tables.contact_capacity(), room, "what has grown is kept");
         grown.pool.resize(2);
         advance(&mut grown, 40);
         assert_eq!(sizes(&grown), sizes(&large), "they may come back");

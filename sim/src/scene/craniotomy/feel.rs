@@ -51,8 +51,8 @@ pub(super) struct Feel<'c> {
     end: SimulationEnd<'c>,
     /// What the loop said at the last swap.
     told: Option<ToolState>,
-    /// When it last said where the device is.
-    heard: Instant,
+    /// When it was first found not to have said anew where the device is, if so at the last swap.
+    silent: Option<Instant>,
     /// The device at the first look in the frame that is being drawn.
     now: Option<ToolState>,
     /// The device at the last swaps, the last one last.
@@ -97,8 +97,8 @@ impl<'c> Feel<'c> {
         let past = VecDeque::with_capacity(HELD + 2);
         let (now, next, tool, bones, drags) = (None, None, None, Vec::new(), Default::default());
         let (rest, shift, grasp) = (None, None, Vec3::ZERO);
-        let (told, heard) = (None, Instant::now());
-        Self { end, told, heard, now, past, next, tool, bones, rest, shift, grasp, drags }
+        let (told, silent) = (None, None);
+        Self { end, told, silent, now, past, next, tool, bones, rest, shift, grasp, drags }
     }
 
     pub(super) fn into_end(self) -> SimulationEnd<'c> {
@@ -175,15 +175,15 @@ impl<'c> Feel<'c> {
         if told.is_fresh || told.fault.is_some() {
             self.told = Some(told);
         }
-        if told.is_fresh && last.is_none_or(|last| told.time > last.time) {
-            self.heard = Instant::now();
-        }
+        let is_heard = told.is_fresh && last.is_none_or(|last| told.time > last.time);
+        // Since the first swap without a word: a slow frame is not the device's silence.
+        self.silent = if is_heard { None } else { self.silent.or_else(|| Some(Instant::now())) };
         self.past.extend(told.is_fresh.then_some(told).or(last));
         if self.past.len() > HELD + 1 {
             self.past.pop_front();
         }
         let mut sample = self.device()?.sample;
-        if self.heard.elapsed() > LETS_GO {
+        if self.silent.is_some_and(|since| since.elapsed() > LETS_GO) {
             sample.buttons = 0;
         }
         match self.tool.map(|tool| tool.push) {
