@@ -1,17 +1,16 @@
 //! What a hand feels: a haptic loop's device moves a tool, and what the tool meets comes back as forces.
 
 use std::collections::VecDeque;
-use std::time::{Duration, Instant};
 
 use glam::{Mat3, Vec3};
 
 use super::SKULL;
 use crate::behavior::drill::Coupling;
 use crate::behavior::{Tool, Work};
-use crate::device::DeviceSample;
 use crate::device::link::{SimulationEnd, ToolState};
 use crate::device::model::{LocalModel, along};
 use crate::device::proxy::{ContactStiffness, Proxy};
+use crate::device::{DeviceError, DeviceSample};
 use crate::object::{Object, ObjectId};
 
 /// How many swaps before the last one the device was where the contacts of the frame that is drawn found the
@@ -19,9 +18,9 @@ use crate::object::{Object, ObjectId};
 const TOUCHED: usize = 2;
 /// Likewise where the tool was when that which it holds was drawn there, which has told since.
 const HELD: usize = 3;
-/// How long nothing may be heard of a device before its buttons count as let go of; usually 0.25 s: a drill whose
-/// device was pulled out is not to go on, and a loop of 5 Hz still says enough.
-const LETS_GO: Duration = Duration::from_millis(250);
+/// How long a device may not be read before its buttons count as let go of, in seconds of its loop's clock; usually 0.25:
+/// a drill whose device was pulled out is not to go on.
+const LETS_GO: f64 = 0.25;
 /// How far a drill is led beside the device at most, in metres; usually 1 mm.
 const SHIFT: f32 = 0.001;
 /// The stiffness with which the dura is felt, in newtons per metre; usually 200, that of its contact.
@@ -51,8 +50,8 @@ pub(super) struct Feel<'c> {
     end: SimulationEnd<'c>,
     /// What the loop said at the last swap.
     told: Option<ToolState>,
-    /// When it was first found not to have said anew where the device is, if so at the last swap.
-    silent: Option<Instant>,
+    /// From when on swaps found that the device could not be read, in seconds of the loop's clock, if the last one did.
+    silent: Option<f64>,
     /// The device at the first look in the frame that is being drawn.
     now: Option<ToolState>,
     /// The device at the last swaps, the last one last.
@@ -175,15 +174,15 @@ impl<'c> Feel<'c> {
         if told.is_fresh || told.fault.is_some() {
             self.told = Some(told);
         }
-        let is_heard = told.is_fresh && last.is_none_or(|last| told.time > last.time);
-        // Since the first swap without a word: a slow frame is not the device's silence.
-        self.silent = if is_heard { None } else { self.silent.or_else(|| Some(Instant::now())) };
+        // Since the first swap at which it was not read: a slow frame is not the device's silence.
+        self.silent = if told.is_fresh { None } else { self.silent.or(Some(told.time)) };
         self.past.extend(told.is_fresh.then_some(told).or(last));
         if self.past.len() > HELD + 1 {
             self.past.pop_front();
         }
         let mut sample = self.device()?.sample;
-        if self.silent.is_some_and(|since| since.elapsed() > LETS_GO) {
+        let is_over = told.fault == Some(DeviceError::Panicked);
+        if is_over || self.silent.is_some_and(|since| told.time - since > LETS_GO) {
             sample.buttons = 0;
         }
         match self.tool.map(|tool| tool.push) {

@@ -238,7 +238,9 @@ fn a_device_that_is_gone_is_told_of_and_lets_go() {
     ticking.tick(0.2);
     assert_eq!(feel.sample(), Some(pressed), "for a tick that is missed nobody lets go");
     assert_eq!(feel.told().and_then(|told| told.fault), Some(DeviceError::Disconnected));
-    feel.silent = feel.silent.map(|since| since - 2 * LETS_GO);
+    ticking.tick(0.2 + 0.9 * LETS_GO);
+    assert_eq!(feel.sample(), Some(pressed), "nor for some");
+    ticking.tick(0.2 + 1.1 * LETS_GO);
     assert_eq!(feel.sample(), Some(DeviceSample { buttons: 0, ..pressed }));
     is_gone.store(false, Ordering::Relaxed);
     ticking.tick(0.6);
