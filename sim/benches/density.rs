@@ -34,8 +34,8 @@ fn density(arguments: &common::Arguments) -> Result<(), ExperimentError> {
         let mut contenders = Vec::new();
         for (&objects, count) in sizes.iter().zip(&counts) {
             // As many regroupings in each run, of however many objects.
-            let frames = arguments.frames_for(objects, 40_000);
-            let frames = frames.next_multiple_of(FRAMES_PER_BLOCKING);
+            let usual = arguments.frames_for(objects, 40_000).next_multiple_of(FRAMES_PER_BLOCKING);
+            let frames = arguments.frames.unwrap_or(usual);
             let filling = if arguments.test { 3 } else { FILLING };
             contenders.push(environment(runner, objects, filling, frames, count)?);
         }

@@ -193,6 +193,7 @@ impl Stages {
             post,
         };
         let mut waits = false;
+        // Scenery that is told nothing is as it was, and need not be measured.
         let mut changed = !object.is_fixed();
         let done = catch_unwind(AssertUnwindSafe(|| {
             for message in mail {

@@ -46,8 +46,8 @@ pub struct SettingsError {
 
 impl ForceSettings {
     /// The usual settings for a loop at `rate` hertz: forces change as fast as at 1 kHz, and the damping is at most
-    /// half of m/T for a device of m = 0.1 kg. A loop of less than 142 Hz has less of it than
-    /// bone of 2 kN/m takes, K·T/2.
+    /// half of m/T for a device of m = 0.1 kg. A loop of less than 142 Hz has less of it than bone of
+    /// 2 kN/m takes, K·T/2.
     #[must_use]
     pub fn at(rate: f64) -> Self {
         Self {

@@ -163,6 +163,7 @@ mod tests {
         running.begin();
         (0..FRAMES_PER_SAMPLE).for_each(|number| frame(&mut running, number));
         assert!(running.timed < running.all);
+        assert!(!is_sampled(0) && (0..3).any(is_sampled), "short runs have one, but not the first");
         let all = running.all;
         clock.watch(Arc::new(Timeline::new(1, 1)), 0);
         frame(&mut running, 1);

@@ -135,7 +135,7 @@ impl Partners {
     }
 
     /// Finds the partners of block `first`, itself among them, whose objects may touch its own. `block` is asked for
-    /// blocks only where their boxes overlap.
+    /// others only where their boxes overlap.
     pub(super) fn find<B: Deref<Target = Block>>(
         &self,
         first: usize,
@@ -238,8 +238,10 @@ pub(super) fn first_outcomes(blocks: usize, grain: Grain) -> Vec<Outcome> {
         Grain::Spatial => RECORDS_PER_CANDIDATE,
         Grain::Pairwise => RECORDS_PER_PAIR,
     };
-    let contacts = || ContactBuffer::with_capacity(records);
-    let outcome = |_| Outcome { contacts: contacts(), pairs: PairCount::default() };
+    let outcome = |_| Outcome {
+        contacts: ContactBuffer::with_capacity(records),
+        pairs: PairCount::default(),
+    };
     (0..CANDIDATES_PER_BLOCK * blocks).map(outcome).collect()
 }
 

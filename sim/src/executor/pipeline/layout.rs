@@ -35,9 +35,8 @@ impl Layout {
         grain: Grain,
         workers: usize,
     ) -> Result<Self, BlockingError> {
-        let homes = homes(workers);
-        let Formed { blocking, blocks, interactions } =
-            Formed::new(objects, stages, (grain, workers), homes)?;
+        let Formed { blocking, blocks, interactions, homes } =
+            Formed::new(objects, stages, grain, workers)?;
         Ok(Self {
             tables: Tables::new(&blocks, interactions, homes as usize),
             register: Register::new(&blocks),
@@ -61,10 +60,9 @@ impl Layout {
         grain: Grain,
     ) -> Result<(), BlockingError> {
         if workers > self.workers {
-            let homes = homes(workers);
             let objects = self.blocks.drain(..).flat_map(|block| block.objects).collect();
-            let Formed { blocking, blocks, interactions } =
-                Formed::new(objects, stages, (grain, workers), homes)?;
+            let Formed { blocking, blocks, interactions, homes } =
+                Formed::new(objects, stages, grain, workers)?;
             self.tables.model(interactions, blocks.len(), homes as usize);
             (self.register, self.room) = (Register::new(&blocks), Room::of(blocks.iter()));
             (self.blocks, self.blocking) = (blocks, blocking);
@@ -90,15 +88,17 @@ struct Formed {
     blocking: Blocking,
     blocks: Vec<Block>,
     interactions: Vec<InteractionSlot<Found>>,
+    homes: u32,
 }
 
 impl Formed {
     fn new(
         objects: Vec<Object>,
         stages: &Stages,
-        (grain, workers): (Grain, usize),
-        homes: u32,
+        grain: Grain,
+        workers: usize,
     ) -> Result<Self, BlockingError> {
+        let homes = homes(workers);
         let (mut blocking, mut blocks) = Blocking::new(objects, grain, workers)?;
         let interactions = match grain {
             Grain::Spatial => {
@@ -111,11 +111,11 @@ impl Formed {
             }
             Grain::Pairwise => modelled_interactions(stages, &blocks),
         };
-        Ok(Self { blocking, blocks, interactions })
+        Ok(Self { blocking, blocks, interactions, homes })
     }
 }
 
-/// The homes of so many workers: one for each, or, of more than there can be homes, for as many workers in every home.
+/// The homes of so many workers: one for each, or, where these would be too many, one for as many workers each.
 fn homes(workers: usize) -> u32 {
     workers.div_ceil(workers.div_ceil(MOST_HOMES)) as u32
 }
