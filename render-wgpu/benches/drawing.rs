@@ -20,7 +20,7 @@ use dualframe_sim::experiment::calibrator::Calibrator;
 use dualframe_sim::experiment::machine::Machine;
 use dualframe_sim::experiment::race::{Runner, WARM_UP};
 use dualframe_sim::experiment::statistics::Quartiles;
-use dualframe_sim::experiment::timing::{Contender, Series};
+use dualframe_sim::experiment::timing::{Contender, Series, until_good};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::object::Object;
 use dualframe_sim::render::{NullRenderer, Renderer};
@@ -38,7 +38,8 @@ const SIZE: (u32, u32) = (320, 180);
 /// What is measured.
 #[derive(Parser)]
 struct Arguments {
-    /// Rounds in which the executors take turns.
+    /// Good rounds in which the executors take turns; where the machine is disturbed, up to four times as many rounds
+    /// are run.
     #[arg(long, value_name = "N", default_value_t = 15, value_parser = at_least_one(u64::MAX))]
     rounds: usize,
     /// Numbers of particles.
@@ -69,7 +70,7 @@ struct End {
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = Arguments::parse();
     if arguments.test {
-        arguments = Arguments { rounds: 1, objects: vec![20], ..arguments };
+        arguments.objects = vec![20];
     }
     let gpu = Gpu::new(None)?;
     println!("{}; {}, {} by {} pixels", Machine::this(), gpu.title(), SIZE.0, SIZE.1);
@@ -160,8 +161,9 @@ fn executors(arguments: &Arguments, objects: usize) -> Result<(), Box<dyn Error>
         runners.iter().map(contender).collect();
     let calibrator = Calibrator::default();
     let phase = &mut || calibrator.phase();
+    let rounds = if test { 1..=1 } else { until_good(rounds) };
     let series = Series::measure(&mut contenders, rounds, phase, &mut || ())?;
-    let (marked, which) = (series.marked(), series.best_rounds());
+    let (marked, rounds, which) = (series.marked(), series.rounds().len(), series.best_rounds());
     println!("{objects} objects, every frame drawn, {marked} of {rounds} rounds marked:");
     println!("{:>24}   frames/s   pipeline over it", "");
     for (index, label) in series.labels().iter().enumerate() {

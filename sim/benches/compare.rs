@@ -38,7 +38,7 @@ fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
         let frames = arguments.frames_for(objects, 60_000);
         let stand_in = StandIn::calibrated(&subject, frames)?;
         for load in [RenderLoad::Null, RenderLoad::StandIn(stand_in)] {
-            let (subject, rounds) = (subject.clone(), arguments.rounds);
+            let (subject, rounds) = (subject.clone(), arguments.rounds());
             let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };
             let outcome = race.run(&runners, &mut || calibrator.phase(), &mut || ())?;
             common::print(&race.to_string(), &outcome.series, race.frames as f64);

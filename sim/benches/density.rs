@@ -40,7 +40,8 @@ fn density(arguments: &common::Arguments) -> Result<(), ExperimentError> {
             contenders.push(environment(runner, objects, filling, frames, count)?);
         }
         let mut phase = || calibrator.phase();
-        let series = Series::measure(&mut contenders, arguments.rounds, &mut phase, &mut || ())?;
+        let rounds = arguments.rounds();
+        let series = Series::measure(&mut contenders, rounds, &mut phase, &mut || ())?;
         common::print(&format!("{}, by numbers of objects", runner.label()), &series, 1.0);
         for (objects, count) in sizes.iter().zip(&counts) {
             let Count { collisions, frames } = count.get();

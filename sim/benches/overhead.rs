@@ -26,7 +26,7 @@ fn overhead(arguments: &common::Arguments) -> Result<(), ExperimentError> {
             load: RenderLoad::Null,
             warm_up: WARM_UP,
             frames: arguments.frames_for(objects, 60_000),
-            rounds: arguments.rounds,
+            rounds: arguments.rounds(),
         };
         let outcome = race.run(
             &[Runner::SERIAL, Runner::pipeline(1)],

@@ -30,7 +30,7 @@ fn retraction(arguments: &common::Arguments) -> Result<(), ExperimentError> {
     let mut runners: Vec<Runner> = Runner::parallel(arguments.threads).collect();
     runners.push(Runner::SERIAL);
     for load in [RenderLoad::Null, RenderLoad::StandIn(StandIn::calibrated(&subject, frames)?)] {
-        let (subject, rounds) = (subject.clone(), arguments.rounds);
+        let (subject, rounds) = (subject.clone(), arguments.rounds());
         let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };
         let outcome = race.run(&runners, &mut || calibrator.phase(), &mut || ())?;
         common::print(&race.to_string(), &outcome.series, race.frames as f64);

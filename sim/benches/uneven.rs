@@ -34,7 +34,7 @@ fn uneven(arguments: &common::Arguments) -> Result<(), ExperimentError> {
             let scene =
                 ParticleScene { seed, most_substeps: MOST_SUBSTEPS, ..ParticleScene::new(objects) };
             let frames = arguments.frames_for(objects, 15_000);
-            let (load, rounds) = (RenderLoad::Null, arguments.rounds);
+            let (load, rounds) = (RenderLoad::Null, arguments.rounds());
             let subject = Subject::Particles(scene);
             let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };
             let outcome = race.run(&runners, &mut || calibrator.phase(), &mut || ())?;

@@ -1,5 +1,6 @@
 //! What the benches that time whole frames share: arguments and tables.
 
+use std::ops::RangeInclusive;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -8,14 +9,14 @@ use dualframe_sim::executor::MAX_THREADS;
 use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::machine::Machine;
 use dualframe_sim::experiment::statistics::Quartiles;
-use dualframe_sim::experiment::timing::{Rounds, Series};
+use dualframe_sim::experiment::timing::{self, Rounds, Series};
 
 /// The arguments of a bench.
 #[derive(Parser)]
 pub(crate) struct Arguments {
-    /// Rounds of each race.
+    /// Good rounds of each race; where the machine is disturbed, up to four times as many rounds are run.
     #[arg(long, value_name = "N", default_value_t = 15, value_parser = at_least_one(u64::MAX))]
-    pub(crate) rounds: usize,
+    rounds: usize,
     /// Frames of each run; by default about as many as take 150 ms on one thread.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) frames: Option<u64>,
@@ -38,6 +39,11 @@ fn at_least_one(most: u64) -> RangedU64ValueParser<usize> {
 }
 
 impl Arguments {
+    /// How many rounds a race has: see [`Race::rounds`](dualframe_sim::experiment::race::Race::rounds).
+    pub(crate) fn rounds(&self) -> RangeInclusive<usize> {
+        if self.test { 1..=1 } else { timing::until_good(self.rounds) }
+    }
+
     /// Numbers of particles: those asked for, or else `usual`.
     #[allow(dead_code, reason = "not every bench is of particles")]
     pub(crate) fn objects_or(&self, usual: &[usize]) -> Vec<usize> {
@@ -59,12 +65,10 @@ impl Arguments {
 
 /// Runs a bench: reads its arguments, says what it runs on, and reports its failure.
 pub(crate) fn main(bench: fn(&Arguments) -> Result<(), ExperimentError>) -> ExitCode {
-    let mut arguments = Arguments::parse();
-    if arguments.test {
-        arguments.rounds = 1;
-    }
-    let name = env!("CARGO_CRATE_NAME");
-    println!("{name}: {}; rounds: {}", Machine::this(), arguments.rounds);
+    let arguments = Arguments::parse();
+    let (name, rounds) = (env!("CARGO_CRATE_NAME"), arguments.rounds());
+    let (good, most) = (rounds.start(), rounds.end());
+    println!("{name}: {}; good rounds wanted: {good}, of {most} at most", Machine::this());
     match bench(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

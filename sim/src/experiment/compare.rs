@@ -108,6 +108,7 @@ impl Study<'_> {
             let loads = [RenderLoad::Null, RenderLoad::StandIn(stand_in)];
             for (load, name) in loads.into_iter().zip(names) {
                 let (subject, &Self { frames, rounds, .. }) = (subject.clone(), self);
+                let rounds = rounds..=rounds;
                 let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };
                 let outcome = laboratory.race(race, &runners)?;
                 outcome.add_rounds(&mut all_rounds);

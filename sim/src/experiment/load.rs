@@ -75,7 +75,7 @@ impl Renderer for StandIn {
 /// Seconds of a serial frame without rendering.
 fn serial_frame(subject: &Subject, frames: u64) -> Result<f64, ExperimentError> {
     let (subject, load) = (subject.clone(), RenderLoad::StandIn(StandIn { steps: 0 }));
-    let race = Race { subject, load, warm_up: WARM_UP, frames, rounds: 1 };
+    let race = Race { subject, load, warm_up: WARM_UP, frames, rounds: 1..=1 };
     Ok(race.seconds(Runner::SERIAL)? / frames as f64)
 }
 

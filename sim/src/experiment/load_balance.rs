@@ -61,7 +61,8 @@ impl Balance {
         let calibrator = laboratory.calibrator;
         let mut done = || laboratory.advance(sweep.frames * objects as u64);
         let mut phase = || calibrator.phase();
-        let series = Series::measure(&mut contenders, sweep.rounds, &mut phase, &mut done)?;
+        let rounds = sweep.rounds..=sweep.rounds;
+        let series = Series::measure(&mut contenders, rounds, &mut phase, &mut done)?;
         drop(contenders);
         Ok(Self { objects, runs, series })
     }
@@ -212,7 +213,8 @@ mod tests {
         let mut gains = gains.iter();
         // The first one is before the first round.
         let mut phase = || Phase { gain: gains.next().copied().unwrap_or(2.0), ping_pong: 100.0 };
-        let series = Series::measure(&mut contenders, spreads.len(), &mut phase, &mut || ());
+        let rounds = spreads.len()..=spreads.len();
+        let series = Series::measure(&mut contenders, rounds, &mut phase, &mut || ());
         Balance { objects: 5, runs, series: series.expect("nothing fails") }
     }
 

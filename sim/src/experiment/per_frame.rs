@@ -39,7 +39,8 @@ fn measure(laboratory: &mut Laboratory<'_>) -> Result<Frames, ExperimentError> {
     let (frames, rounds) = (sweep.frames, sweep.rounds);
     // The first frames matter here: they hold most collisions.
     let subject = Subject::Particles(scene);
-    let race = Race { subject, load: RenderLoad::Null, warm_up: 0, frames, rounds };
+    let race =
+        Race { subject, load: RenderLoad::Null, warm_up: 0, frames, rounds: rounds..=rounds };
     let runners: Vec<Runner> = plan.threads.iter().copied().map(Runner::pipeline).collect();
     let mut collisions = vec![0; frames as usize];
     let mut times = vec![Vec::with_capacity(frames as usize * rounds); runners.len()];

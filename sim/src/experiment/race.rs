@@ -2,6 +2,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::panic::resume_unwind;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -69,8 +70,8 @@ pub struct Race {
     pub warm_up: u64,
     /// Frames that are timed.
     pub frames: u64,
-    /// The number of rounds.
-    pub rounds: usize,
+    /// How many rounds are run: at least so many, and on until as many are good, but no more than it ends with.
+    pub rounds: RangeInclusive<usize>,
 }
 
 impl fmt::Display for Race {
@@ -120,7 +121,7 @@ impl Race {
         };
         let mut contenders: Vec<Contender<'_>> =
             runners.iter().enumerate().map(contender).collect();
-        let series = Series::measure(&mut contenders, self.rounds, phase, done)?;
+        let series = Series::measure(&mut contenders, self.rounds.clone(), phase, done)?;
         drop(contenders);
         Ok(Outcome { race: self.clone(), runners: runners.to_vec(), series })
     }
@@ -204,7 +205,7 @@ mod tests {
     #[test]
     fn every_runner_runs_every_round() {
         let subject = Subject::Particles(ParticleScene::new(4));
-        let race = Race { subject, load: RenderLoad::Null, warm_up: 2, frames: 3, rounds: 2 };
+        let race = Race { subject, load: RenderLoad::Null, warm_up: 2, frames: 3, rounds: 2..=2 };
         let runners: Vec<Runner> =
             std::iter::once(Runner::SERIAL).chain(Runner::parallel(2)).collect();
         let mut runs = 0;
@@ -222,7 +223,7 @@ mod tests {
     #[test]
     fn another_state_is_an_error() {
         let subject = Subject::Particles(ParticleScene::new(2));
-        let race = Race { subject, load: RenderLoad::Null, warm_up: 0, frames: 1, rounds: 1 };
+        let race = Race { subject, load: RenderLoad::Null, warm_up: 0, frames: 1, rounds: 1..=1 };
         let other = Cell::new(Some(0));
         let error = race.once(Runner::SERIAL, &other, &mut |_, _| ()).err();
         assert!(matches!(error, Some(ExperimentError::Differs { expected: 0, .. })), "{error:?}");

@@ -19,7 +19,7 @@ pub(super) fn run(laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentE
     let mut outcomes = Vec::new();
     for &objects in &sweep.objects {
         let scene = ParticleScene { seed: plan.seed, ..ParticleScene::new(objects) };
-        let (frames, rounds) = (sweep.frames, sweep.rounds);
+        let (frames, rounds) = (sweep.frames, sweep.rounds..=sweep.rounds);
         let subject = Subject::Particles(scene);
         let race = Race { subject, load: RenderLoad::Null, warm_up: WARM_UP, frames, rounds };
         outcomes.push(laboratory.race(race, &runners)?);

@@ -1,5 +1,6 @@
 //! Contenders timed one after the other in rounds, so that all meet the same phases of the machine.
 
+use std::ops::RangeInclusive;
 use std::thread;
 use std::time::Duration;
 
@@ -10,6 +11,16 @@ use super::statistics::Quartiles;
 /// How long to wait after a contender whose threads may go on spinning for a while: 30 ms, more than
 /// the parallel frameworks' threads spin before they sleep.
 const AFTER_SPINNING: Duration = Duration::from_millis(30);
+
+/// Rounds that are run at most for each that is to be good; usually 4: on a shared machine about every second one is.
+const MOST_FOR_A_GOOD_ROUND: usize = 4;
+
+/// So many good rounds, if up to four times as many rounds have them: what is asked for where time matters less than
+/// what is measured.
+#[must_use]
+pub fn until_good(rounds: usize) -> RangeInclusive<usize> {
+    rounds..=rounds.saturating_mul(MOST_FOR_A_GOOD_ROUND)
+}
 
 /// Something that is timed, and what it fails with.
 pub struct Contender<'a, E = ExperimentError> {
@@ -49,26 +60,28 @@ pub struct Series {
 }
 
 impl Series {
-    /// Times the contenders in so many rounds; each begins with another one, and every other goes backwards, so that
-    /// none always comes after the same one. `phase` measures the machine's present phase, `done` is told after each
-    /// run.
+    /// Times the contenders in rounds: as many as `rounds` begins with, and on until as many are good, but no more than
+    /// it ends with. Each begins with another contender, and every other goes backwards, so that none always comes
+    /// after the same one. `phase` measures the machine's present phase, `done` is told after each run.
     ///
     /// # Errors
     /// Whatever a contender fails with.
     pub fn measure<E>(
         contenders: &mut [Contender<'_, E>],
-        rounds: usize,
+        rounds: RangeInclusive<usize>,
         phase: &mut dyn FnMut() -> Phase,
         done: &mut dyn FnMut(),
     ) -> Result<Self, E> {
+        let (wanted, most) = rounds.into_inner();
         let labels = contenders.iter().map(|contender| contender.label.clone()).collect();
         let count = contenders.len();
         let mut phases = vec![phase()];
-        let mut measured = Vec::with_capacity(rounds);
-        for round in 0..rounds {
+        let mut series = Self { labels, rounds: Vec::new(), usual_ping_pong: f64::INFINITY };
+        while series.rounds.len() < most && series.rounds.len() - series.marked() < wanted {
+            let round = series.rounds.len();
             let mut seconds = vec![0.0; count];
             for turn in 0..count {
-                let turn = if round % 2 == 0 { turn } else { count - turn };
+                let turn = if round.is_multiple_of(2) { turn } else { count - turn };
                 let index = (round + turn) % count;
                 let contender = &mut contenders[index];
                 seconds[index] = (contender.run)()?;
@@ -78,11 +91,11 @@ impl Series {
                 done();
             }
             let (before, after) = (phases[round], phase());
-            measured.push(Round { seconds, phase: before.worse(after) });
+            series.rounds.push(Round { seconds, phase: before.worse(after) });
             phases.push(after);
+            series.usual_ping_pong = Phase::usual_ping_pong(&phases);
         }
-        let usual_ping_pong = Phase::usual_ping_pong(&phases);
-        Ok(Self { labels, rounds: measured, usual_ping_pong })
+        Ok(series)
     }
 
     /// The contenders' labels.
@@ -158,11 +171,15 @@ mod tests {
     }
 
     fn series(phases: &[Phase]) -> (Series, String) {
+        rounds_in(4..=4, phases)
+    }
+
+    fn rounds_in(rounds: RangeInclusive<usize>, phases: &[Phase]) -> (Series, String) {
         let order = RefCell::default();
         let mut contenders = ["a", "b", "c"].map(|label| contender(label, &order));
         let mut phases = phases.iter().copied();
         let mut next = || phases.next().unwrap_or(GOOD);
-        let series = Series::measure(&mut contenders, 4, &mut next, &mut || ());
+        let series = Series::measure(&mut contenders, rounds, &mut next, &mut || ());
         drop(contenders);
         (series.expect("no contender fails"), order.into_inner())
     }
@@ -212,10 +229,20 @@ mod tests {
     }
 
     #[test]
+    fn on_until_enough_rounds_are_good() {
+        let lost_core = Phase { gain: 1.2, ..GOOD };
+        let phases = [GOOD, lost_core, lost_core, GOOD, GOOD, GOOD];
+        let (series, _) = rounds_in(2..=9, &phases);
+        assert_eq!(series.marks(), [true, true, true, false, false]);
+        let (series, _) = rounds_in(2..=4, &phases);
+        assert_eq!(series.marks(), [true, true, true, false], "no more than four");
+    }
+
+    #[test]
     fn failures_are_passed_on() {
         let fail = || Err(ExperimentError::Quarantined { run: "a".to_owned(), objects: 1 });
         let mut contenders =
             [Contender { label: "a".to_owned(), spins: true, run: Box::new(fail) }];
-        assert!(Series::measure(&mut contenders, 1, &mut || GOOD, &mut || ()).is_err());
+        assert!(Series::measure(&mut contenders, 1..=1, &mut || GOOD, &mut || ()).is_err());
     }
 }
