@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::blocking::Grain;
 use crate::executor::{
     Entry, Executor, ExecutorError, ExecutorKind, MAX_THREADS, OnFrame, PipelineExecutor,
-    RayonExecutor, RayonOverlappedExecutor, SerialExecutor, StageSeconds, StaticExecutor,
+    RayonExecutor, RayonOverlappedExecutor, Refused, SerialExecutor, StageSeconds, StaticExecutor,
     state_hash,
 };
 #[cfg(feature = "native-peers")]
@@ -61,11 +61,13 @@ impl VeManager {
     /// A manager of `scene`, before its next frame.
     ///
     /// # Errors
-    /// A number of threads or of objects beyond its limit, threads that cannot be had.
-    pub fn new(scene: Scene, settings: Settings) -> Result<Self, ExecutorError> {
+    /// A number of threads or of objects beyond its limit, numbers of objects that are not 0, 1, 2 … without gaps, or
+    /// threads that cannot be had. The scene comes back: it can be run in another way.
+    pub fn new(scene: Scene, settings: Settings) -> Result<Self, Box<Refused>> {
         let Settings { executor, threads, pinned, grain, entry } = settings;
+        // The pool would take the nearest number.
         if !(1..=MAX_THREADS).contains(&threads) {
-            return Err(ExecutorError::Threads { threads });
+            return Err(Box::new(Refused { scene, error: ExecutorError::Threads { threads } }));
         }
         let pool = Arc::new(Pool::new(threads, pinned));
         let executor: Box<dyn Executor> = match executor {

@@ -164,7 +164,7 @@ fn too_many_objects_or_threads() {
     for threads in [0, dualframe_sim::executor::MAX_THREADS + 1] {
         let settings = Settings { threads, ..Settings::default() };
         let refused = VeManager::new(scene(1), settings).err().expect("beyond the limit");
-        assert!(matches!(refused, ExecutorError::Threads { threads: t } if t == threads));
+        assert!(matches!(refused.error, ExecutorError::Threads { threads: t } if t == threads));
     }
 }
 

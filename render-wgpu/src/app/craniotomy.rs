@@ -27,7 +27,7 @@ use super::AllocationCounter;
 use super::args::CraniotomyArgs;
 use super::error::RunError;
 use super::haptics::{Cells, Each, Loops};
-use super::manage::{Manage, Spent, manage, timeline_of};
+use super::manage::{Manage, Spent, go_on, manage, timeline_of};
 use super::measure::Measure;
 use super::operator::Operator;
 use super::outputs::Outputs;
@@ -79,8 +79,7 @@ fn run_beside<'c>(
     };
     let traced = || outputs.trace.as_ref().map(|_| timeline_of(&args.products, settings.threads));
     let timeline = window.as_ref().map(Session::timeline).or_else(traced);
-    let manage = |scene| manage(scene, settings, timeline.as_ref());
-    let manager = manage(scene)?;
+    let manager = manage(scene, settings, timeline.as_ref())?;
     let begin = |manager: &VeManager| {
         Recording::begin(outputs.record.as_deref(), patient.spec(), manager, told)
     };
@@ -95,7 +94,8 @@ fn run_beside<'c>(
             (manager, at_hand.surgery, measure)
         }
         None => {
-            let how = (manager, Manage { make: &manage, spent: &spent });
+            let make = |scene| go_on(scene, settings, timeline.as_ref(), told);
+            let how = (manager, Manage { make: &make, spent: &spent });
             run_unwatched((args, patient, outputs), links, how, begin, count, told)?
         }
     };

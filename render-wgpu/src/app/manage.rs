@@ -3,13 +3,14 @@
 use std::cell::RefCell;
 use std::sync::Arc;
 
-use dualframe_sim::executor::{ExecutorError, StageSeconds};
+use dualframe_sim::executor::{ExecutorError, ExecutorKind, Refused, StageSeconds};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::scene::Scene;
 use dualframe_sim::timeline::Timeline;
 
 use super::args::Products;
 use super::error::RunError;
+use super::told::Told;
 
 /// Spans of a worker that its timeline keeps for a trace; usually 65,536, some seconds of work.
 const TRACED_SPANS: usize = 1 << 16;
@@ -58,7 +59,7 @@ pub(super) fn timeline_of(products: &Products, workers: usize) -> Arc<Timeline> 
     Arc::new(Timeline::new(workers + 1, spans))
 }
 
-/// Whether a manager can go on after an error, with as many threads as it had before.
+/// Whether an environment can go on after an error, without the threads that were asked for.
 pub(super) fn can_go_on(error: &ExecutorError) -> bool {
     matches!(error, ExecutorError::Spawn(_) | ExecutorError::Pool(_))
 }
@@ -69,9 +70,49 @@ pub(super) fn manage(
     settings: Settings,
     timeline: Option<&Arc<Timeline>>,
 ) -> Result<VeManager, RunError> {
-    let mut manager = VeManager::new(scene, settings)?;
+    let manager = VeManager::new(scene, settings).map_err(ExecutorError::from)?;
+    Ok(watched(manager, timeline))
+}
+
+/// As [`manage`], of a scene that was taken out of another manager: where it cannot be run as asked for, for want of
+/// threads, the serial executor goes on with it.
+pub(super) fn go_on(
+    scene: Scene,
+    settings: Settings,
+    timeline: Option<&Arc<Timeline>>,
+    told: &Told,
+) -> Result<VeManager, RunError> {
+    match VeManager::new(scene, settings) {
+        Ok(manager) => Ok(watched(manager, timeline)),
+        Err(refused) => {
+            let Refused { scene, error } = *refused;
+            told.failure(&error.into());
+            let settings = Settings { executor: ExecutorKind::Serial, threads: 1, ..settings };
+            manage(scene, settings, timeline)
+        }
+    }
+}
+
+fn watched(mut manager: VeManager, timeline: Option<&Arc<Timeline>>) -> VeManager {
     if let Some(timeline) = timeline {
         manager.watch(Arc::clone(timeline));
     }
-    Ok(manager)
+    manager
+}
+
+#[cfg(test)]
+mod tests {
+    use dualframe_sim::scene::ParticleScene;
+
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_run_as_asked_for_goes_on() {
+        let scene = ParticleScene::new(3).build().expect("a valid scene");
+        let told = Told::default();
+        let settings = Settings { threads: 0, ..Settings::default() };
+        let manager = go_on(scene, settings, None, &told).expect("the serial executor takes it");
+        assert_eq!(manager.settings().executor, ExecutorKind::Serial);
+        assert_ne!(format!("{:?}", told.status()), format!("{:?}", Told::default().status()));
+    }
 }

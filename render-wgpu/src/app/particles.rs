@@ -126,7 +126,7 @@ fn run_unwatched(
 /// Seconds that the serial executor takes for the first frames of the same environment.
 fn serial_seconds(args: &Particles, settings: Settings, frames: u64) -> Result<f64, RunError> {
     let settings = Settings { executor: ExecutorKind::Serial, threads: 1, ..settings };
-    let mut manager = VeManager::new(build(args)?, settings)?;
+    let mut manager = manage(build(args)?, settings, None)?;
     let frames = frames.min(REFERENCE_FRAMES);
     let mut measure = Measure::new(Some(frames), &|| 0);
     measure.start();

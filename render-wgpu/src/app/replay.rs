@@ -127,7 +127,9 @@ pub(super) fn run(args: &ReplayArgs, json: Option<&Output>) -> Result<ReplayRepo
     check(any.input())?;
     let mut scene = any.build(args.way.simd())?;
     replay.begin(&mut scene);
-    let mut manager = VeManager::new(scene, args.way.settings(any.grain()))?;
+    let settings = args.way.settings(any.grain());
+    let manage = |scene| VeManager::new(scene, settings).map_err(ExecutorError::from);
+    let mut manager = manage(scene)?;
     let bar = ProgressBar::new_spinner();
     let began = Instant::now();
     let (manager, fault) = loop {
@@ -142,7 +144,7 @@ pub(super) fn run(args: &ReplayArgs, json: Option<&Output>) -> Result<ReplayRepo
             Ok(Step::Objects(spec)) => {
                 let mut scene = manager.into_scene();
                 let added = any.add(&mut scene, &spec);
-                manager = VeManager::new(scene, args.way.settings(any.grain()))?;
+                manager = manage(scene)?;
                 if let Err(error) = added {
                     break (manager, Some(error.into()));
                 }

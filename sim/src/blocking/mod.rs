@@ -92,12 +92,21 @@ impl Blocking {
     /// Groups the objects for so many workers.
     ///
     /// # Errors
-    /// Object numbers that are not 0, 1, 2 …, or more objects than the grain allows.
+    /// Those of [`Self::check`].
     pub fn new(
         objects: Vec<Object>,
         grain: Grain,
         workers: usize,
     ) -> Result<(Self, Vec<Block>), BlockingError> {
+        Self::check(&objects, grain)?;
+        Ok(Self::group(objects, grain, workers))
+    }
+
+    /// Whether the objects can be grouped.
+    ///
+    /// # Errors
+    /// Object numbers that are not 0, 1, 2 …, or more objects than the grain allows.
+    pub fn check(objects: &[Object], grain: Grain) -> Result<(), BlockingError> {
         let limit = match grain {
             Grain::Spatial => Self::MAX_OBJECTS,
             Grain::Pairwise => Self::MAX_PAIRWISE_OBJECTS,
@@ -106,20 +115,25 @@ impl Blocking {
         if count > limit {
             return Err(BlockingError::TooManyObjects { objects: count, limit });
         }
-        let mut slots: Vec<Option<Object>> = Vec::new();
-        slots.resize_with(count, || None);
-        for mut object in objects {
-            object.refit();
-            let id = object.id().0;
-            match slots.get_mut(id as usize) {
-                Some(slot @ None) => *slot = Some(object),
+        let mut is_there = vec![false; count];
+        for id in objects.iter().map(|object| object.id().0) {
+            match is_there.get_mut(id as usize) {
+                Some(is_there @ false) => *is_there = true,
                 _ => return Err(BlockingError::Number { id, objects: count }),
             }
         }
-        Ok(Self::group(slots, grain, workers))
+        Ok(())
     }
 
-    fn group(objects: Vec<Option<Object>>, grain: Grain, workers: usize) -> (Self, Vec<Block>) {
+    /// Groups objects that [can be](Self::check) for so many workers.
+    pub(crate) fn group(
+        mut objects: Vec<Object>,
+        grain: Grain,
+        workers: usize,
+    ) -> (Self, Vec<Block>) {
+        objects.sort_unstable_by_key(Object::id);
+        objects.iter_mut().for_each(Object::refit);
+        let objects: Vec<Option<Object>> = objects.into_iter().map(Some).collect();
         let mut kinds: [Vec<u32>; 3] = Default::default();
         for object in objects.iter().flatten() {
             kinds[kind(object)].push(object.id().0);

@@ -6,7 +6,6 @@ use super::clock::{Clock, Running, Stage, StageSeconds, Timer};
 use super::mail::Mail;
 use super::parallel_for::ParallelFor;
 use super::world::{self, Candidates, Outbox, Outcome, World};
-use super::{ExecutorError, MAX_THREADS};
 use crate::behavior::{Room, Workspace};
 use crate::block::Block;
 use crate::blocking::Grain;
@@ -70,21 +69,13 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Whether there can be so many threads.
-pub(super) fn check_threads(threads: usize) -> Result<(), ExecutorError> {
-    match (1..=MAX_THREADS).contains(&threads) {
-        true => Ok(()),
-        false => Err(ExecutorError::Threads { threads }),
-    }
-}
-
 impl Engine {
-    pub(super) fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
-        check_threads(threads)?;
+    /// Of a scene whose objects can be grouped.
+    pub(super) fn new(scene: Scene, grain: Grain, threads: usize) -> Self {
         let frame = scene.frame;
-        let world = World::new(scene, grain, threads)?;
+        let world = World::new(scene, grain, threads);
         let blocks = world.blocks.len();
-        Ok(Self {
+        Self {
             workers: (0..threads).map(|_| Worker::new(&world.blocks)).collect(),
             frame,
             bounds: Vec::with_capacity(blocks),
@@ -92,7 +83,7 @@ impl Engine {
             candidates: Candidates::new(blocks),
             outcomes: world::first_outcomes(blocks, grain),
             world,
-        })
+        }
     }
 
     /// Computes the frame [`Self::frame`], which is then to be counted. `updated` is shown each block right

@@ -15,6 +15,7 @@ mod parallel_for;
 mod pipeline;
 mod rayon;
 mod rayon_overlapped;
+mod refused;
 mod serial;
 mod static_;
 mod world;
@@ -41,6 +42,7 @@ pub use native::{
 pub use parallel_for::{LoopExecutor, ParallelFor};
 pub use pipeline::{Entry, PipelineExecutor};
 pub use rayon_overlapped::RayonOverlappedExecutor;
+pub use refused::Refused;
 pub use serial::SerialExecutor;
 pub use static_::StaticExecutor;
 

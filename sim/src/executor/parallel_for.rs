@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::clock::{Running, Stage, StageSeconds};
 use super::engine::Engine;
-use super::{Executor, ExecutorError, FrameRecord, OnFrame, world};
+use super::{Executor, ExecutorError, FrameRecord, OnFrame, Refused, world};
 use crate::blocking::Grain;
 use crate::mailbox::Mailbox;
 use crate::object::Object;
@@ -60,9 +60,10 @@ impl<P: ParallelFor> LoopExecutor<P> {
     ///
     /// # Errors
     /// No or too many threads, objects that cannot be grouped, or threads that cannot be had.
-    pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
-        let engine = Engine::new(scene, grain, threads)?;
-        Ok(Self { engine, loops: P::new(threads)?, running: Running::new() })
+    pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, Box<Refused>> {
+        let (scene, loops) = Refused::unless(scene, grain, threads, || P::new(threads))?;
+        let engine = Engine::new(scene, grain, threads);
+        Ok(Self { engine, loops, running: Running::new() })
     }
 }
 

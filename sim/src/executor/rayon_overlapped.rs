@@ -7,7 +7,7 @@ use super::clock::{Clock, Running, Stage, StageSeconds};
 use super::engine::Engine;
 use super::parallel_for::ParallelFor;
 use super::rayon::RayonLoops;
-use super::{Executor, ExecutorError, FrameRecord, OnFrame, world};
+use super::{Executor, ExecutorError, FrameRecord, OnFrame, Refused, world};
 use crate::block::Block;
 use crate::blocking::Grain;
 use crate::mailbox::Mailbox;
@@ -44,13 +44,14 @@ impl RayonOverlappedExecutor {
     ///
     /// # Errors
     /// No or too many threads, objects that cannot be grouped, or a pool that cannot be started.
-    pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
-        let engine = Engine::new(scene, grain, threads)?;
+    pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, Box<Refused>> {
+        let (scene, loops) = Refused::unless(scene, grain, threads, || RayonLoops::new(threads))?;
+        let engine = Engine::new(scene, grain, threads);
         let mut pictures = Vec::with_capacity(PICTURES);
         pictures.resize_with(PICTURES, || picture(&engine.world.blocks));
         let frame = engine.frame;
-        let (loops, clock) = (RayonLoops::new(threads)?, Clock::default());
-        Ok(Self { engine, loops, pictures, frame, clock, running: Running::new() })
+        let (clock, running) = (Clock::default(), Running::new());
+        Ok(Self { engine, loops, pictures, frame, clock, running })
     }
 }
 

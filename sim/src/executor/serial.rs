@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::clock::{Clock, Running, Stage, StageSeconds};
 use super::world::{self, Candidates, Outbox, Outcome, World};
-use super::{Executor, ExecutorError, FrameRecord, OnFrame};
+use super::{Executor, ExecutorError, FrameRecord, OnFrame, Refused};
 use crate::behavior::{Room, Workspace};
 use crate::block::Block;
 use crate::blocking::Grain;
@@ -37,9 +37,10 @@ impl SerialExecutor {
     ///
     /// # Errors
     /// Objects that cannot be grouped.
-    pub fn new(scene: Scene, grain: Grain) -> Result<Self, ExecutorError> {
+    pub fn new(scene: Scene, grain: Grain) -> Result<Self, Box<Refused>> {
+        let (scene, ()) = Refused::unless(scene, grain, 1, || Ok(()))?;
         let frame = scene.frame;
-        let world = World::new(scene, grain, 1)?;
+        let world = World::new(scene, grain, 1);
         let blocks = world.blocks.len();
         Ok(Self {
             bounds: Vec::with_capacity(blocks),

@@ -2,17 +2,17 @@
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::thread::JoinHandle;
 
 use super::barrier::Barrier;
 use super::clock::{Clock, Running, Stage, StageSeconds, Timer};
-use super::engine::check_threads;
 use super::mail::Mail;
 use super::on_panic::OnPanic;
 use super::outside::Outside;
 use super::world::{self, Candidates, Outbox, Outcome, Partners, World};
-use super::{Executor, ExecutorError, FrameRecord, OnFrame};
+use super::{Executor, ExecutorError, FrameRecord, OnFrame, Refused};
 use crate::behavior::{Room, Workspace};
 use crate::block::Block;
 use crate::blocking::{Blocking, Grain};
@@ -79,10 +79,10 @@ impl StaticExecutor {
     ///
     /// # Errors
     /// No or too many threads, objects that cannot be grouped, or a thread that cannot be started.
-    pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
-        check_threads(threads)?;
+    pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, Box<Refused>> {
+        let (scene, waiting) = Refused::unless(scene, grain, threads, || start(threads))?;
         let frame = scene.frame;
-        let world = World::new(scene, grain, threads)?;
+        let world = World::new(scene, grain, threads);
         let count = world.blocks.len();
         let plan = Plan {
             stages: world.stages,
@@ -106,7 +106,8 @@ impl StaticExecutor {
             outside: world.outside,
             room,
         });
-        let team = Team { threads: start(&shared, threads)?, shared: Arc::clone(&shared) };
+        let threads = waiting.into_iter().map(|thread| thread.begin(&shared)).collect();
+        let team = Team { threads, shared: Arc::clone(&shared) };
         let (blocking, running) = (world.blocking, Running::new());
         Ok(Self { team, shared, blocking, own: Own::new(room), grain, running, frame })
     }
@@ -144,23 +145,29 @@ impl StaticExecutor {
     }
 }
 
+/// A thread that waits for what it is to share; without it, it ends.
+struct Waiting {
+    share: Sender<Arc<Shared>>,
+    thread: JoinHandle<()>,
+}
+
 /// Starts all threads but the calling one.
-fn start(shared: &Arc<Shared>, threads: usize) -> Result<Vec<JoinHandle<()>>, ExecutorError> {
-    let mut started = Vec::with_capacity(threads - 1);
-    for worker in 1..threads {
-        let theirs = Arc::clone(shared);
+fn start(threads: usize) -> Result<Vec<Waiting>, ExecutorError> {
+    let start = |worker| {
+        let (share, shared) = channel::<Arc<Shared>>();
+        let work = move || shared.iter().for_each(|shared| shared.work(worker));
         let builder = std::thread::Builder::new().name(format!("static {worker}"));
-        match builder.spawn(move || theirs.work(worker)) {
-            Ok(thread) => started.push(thread),
-            Err(error) => {
-                // Those that run wait for a frame that will never begin with all of them there.
-                shared.stop.store(true, Ordering::Relaxed);
-                (started.len()..threads).for_each(|_| shared.barrier.arrive());
-                return Err(ExecutorError::Spawn(error));
-            }
-        }
+        Ok(Waiting { share, thread: builder.spawn(work).map_err(ExecutorError::Spawn)? })
+    };
+    (1..threads).map(start).collect()
+}
+
+impl Waiting {
+    fn begin(self, shared: &Arc<Shared>) -> JoinHandle<()> {
+        // It waits: nothing else has its receiver.
+        let _ = self.share.send(Arc::clone(shared));
+        self.thread
     }
-    Ok(started)
 }
 
 impl Own {

@@ -4,7 +4,6 @@
 use std::ops::Deref;
 use std::sync::Arc;
 
-use super::ExecutorError;
 use super::mail::Mail;
 use super::outside::Outside;
 use crate::block::Block;
@@ -37,14 +36,15 @@ pub(super) struct World {
 }
 
 impl World {
-    pub(super) fn new(scene: Scene, grain: Grain, workers: usize) -> Result<Self, ExecutorError> {
+    /// Of a scene whose objects can be grouped.
+    pub(super) fn new(scene: Scene, grain: Grain, workers: usize) -> Self {
         let Scene { objects, stages, frame, mail: under_way, mailbox } = scene;
-        let (blocking, blocks) = Blocking::new(objects, grain, workers)?;
+        let (blocking, blocks) = Blocking::group(objects, grain, workers);
         let partners = Partners::new(&stages, grain, blocks.len(), |index| &blocks[index]);
         let mut mail = Mail::default();
         let collect = |from, to, message| mail.collect(from, to, message);
         let outside = Arc::new(Outside::new(mailbox, under_way, frame, collect));
-        Ok(Self { stages, blocks, blocking, partners, mail, outside, grain })
+        Self { stages, blocks, blocking, partners, mail, outside, grain }
     }
 
     /// The environment before the frame `frame`.

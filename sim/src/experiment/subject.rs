@@ -69,7 +69,8 @@ impl Subject {
         };
         let Runner { executor, threads } = runner;
         let settings = Settings { executor, threads, grain, ..Settings::default() };
-        Ok(Session { manager: VeManager::new(scene, settings)?, operation: self.operation() })
+        let manager = VeManager::new(scene, settings).map_err(ExecutorError::from)?;
+        Ok(Session { manager, operation: self.operation() })
     }
 
     fn operation(&self) -> Option<Operation<'static>> {

@@ -38,7 +38,7 @@ pub(super) use self::particles::ParticlesAtHand;
 use self::view::{Shown, View};
 use super::args::{Products, Way, entry};
 use super::error::RunError;
-use super::manage::{Manage, Spent, can_go_on, manage, timeline_of};
+use super::manage::{Manage, Spent, can_go_on, go_on, manage, timeline_of};
 use super::measure::Measure;
 use super::pictures;
 use super::recording::Recording;
@@ -154,7 +154,8 @@ impl<'a, S: Scenario> Session<'a, S> {
     /// environment as it is then, and the scenario.
     ///
     /// # Errors
-    /// No other manager could be made of an environment that was taken out of one: it is lost.
+    /// No other manager could be made of an environment that was taken out of one, for other reasons than threads that
+    /// cannot be had: it is lost.
     pub(super) fn run(
         mut self,
         mut manager: VeManager,
@@ -255,10 +256,20 @@ impl<'a, S: Scenario> Session<'a, S> {
         manager: VeManager,
         recording: &mut Recording<'_>,
     ) -> Result<VeManager, RunError> {
-        let (settings, timeline) = (self.settings(), self.timeline());
-        let make = move |scene| manage(scene, settings, Some(&timeline));
+        let (settings, timeline, told) = (self.settings(), self.timeline(), self.told);
+        let make = move |scene| go_on(scene, settings, Some(&timeline), told);
         let manage = Manage { make: &make, spent: self.spent };
-        self.scenario.tend(&mut self.view, manager, recording, manage)
+        let manager = self.scenario.tend(&mut self.view, manager, recording, manage)?;
+        self.show_executor(&manager);
+        Ok(manager)
+    }
+
+    /// Shows by what the environment is run: not as was asked for, where that could not be had.
+    fn show_executor(&mut self, manager: &VeManager) {
+        let executor = manager.settings().executor;
+        if std::mem::replace(&mut self.applied.executor, executor) != executor {
+            self.view.controls.executor = executor;
+        }
     }
 
     /// Takes all objects as they are, to be drawn.
@@ -300,7 +311,10 @@ impl<'a, S: Scenario> Session<'a, S> {
             || (!is_pipeline && now.threads != before.threads);
         if is_rebuilt {
             self.spent.add(&manager.stage_seconds());
-            manager = self.manage(manager.into_scene())?;
+            let (scene, timeline) = (manager.into_scene(), self.timeline());
+            manager = go_on(scene, self.settings(), Some(&timeline), self.told)?;
+            self.hired = self.applied.threads;
+            self.show_executor(&manager);
         }
         if is_restarted || is_rebuilt {
             // That was no frame's time.
@@ -314,15 +328,10 @@ impl<'a, S: Scenario> Session<'a, S> {
     /// Starts anew, if it can.
     fn restart(&mut self) -> Result<VeManager, RunError> {
         let scene = self.scenario.build(&self.view.hand)?;
-        let manager = self.manage(scene)?;
-        self.scenario.begin_anew(&self.view.hand);
-        self.view.turn_to(self.scenario.look(), manager.mailbox());
-        Ok(manager)
-    }
-
-    fn manage(&mut self, scene: Scene) -> Result<VeManager, RunError> {
         let manager = manage(scene, self.settings(), Some(&self.view.timeline))?;
         self.hired = self.applied.threads;
+        self.scenario.begin_anew(&self.view.hand);
+        self.view.turn_to(self.scenario.look(), manager.mailbox());
         Ok(manager)
     }
 

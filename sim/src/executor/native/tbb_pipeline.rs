@@ -4,10 +4,10 @@ use std::sync::Arc;
 use std::thread;
 
 use super::super::clock::{Running, Stage, StageSeconds};
-use super::super::engine::{Updating, Worker, check_threads};
+use super::super::engine::{Updating, Worker};
 use super::super::parallel_for::ParallelFor;
 use super::super::world::{self, Candidates, Outcome, World};
-use super::super::{Executor, ExecutorError, FrameRecord, OnFrame};
+use super::super::{Executor, ExecutorError, FrameRecord, OnFrame, Refused};
 use super::shim::Tbb;
 use crate::block::Block;
 use crate::blocking::Grain;
@@ -54,13 +54,13 @@ impl TbbPipelineExecutor {
     ///
     /// # Errors
     /// No or too many threads, or objects that cannot be grouped.
-    pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, ExecutorError> {
-        check_threads(threads)?;
+    pub fn new(scene: Scene, grain: Grain, threads: usize) -> Result<Self, Box<Refused>> {
+        let (scene, arena) = Refused::unless(scene, grain, threads, || Tbb::new(threads))?;
         let frame = scene.frame;
-        let world = World::new(scene, grain, threads)?;
+        let world = World::new(scene, grain, threads);
         let blocks = world.blocks.len();
         Ok(Self {
-            arena: Tbb::new(threads)?,
+            arena,
             workers: (0..threads).map(|_| Worker::new(&world.blocks)).collect(),
             bounds: Vec::with_capacity(blocks),
             searches: (0..blocks).map(|_| Search::new(grain)).collect(),

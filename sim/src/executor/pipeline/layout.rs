@@ -8,7 +8,7 @@ use super::host::{Found, Register};
 use super::memory::{Tables, modelled_interactions, spare_interactions};
 use crate::behavior::Room;
 use crate::block::Block;
-use crate::blocking::{Blocking, BlockingError, Grain};
+use crate::blocking::{Blocking, Grain};
 use crate::object::Object;
 use crate::stages::Stages;
 
@@ -25,19 +25,11 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Of these objects, for so many workers.
-    ///
-    /// # Errors
-    /// More objects than the grain allows, or numbers of objects that are not 0, 1, 2 … without gaps.
-    pub(super) fn new(
-        objects: Vec<Object>,
-        stages: &Stages,
-        grain: Grain,
-        workers: usize,
-    ) -> Result<Self, BlockingError> {
+    /// Of these objects, which can be grouped, for so many workers.
+    pub(super) fn new(objects: Vec<Object>, stages: &Stages, grain: Grain, workers: usize) -> Self {
         let Formed { blocking, blocks, interactions, homes } =
-            Formed::new(objects, stages, grain, workers)?;
-        Ok(Self {
+            Formed::new(objects, stages, grain, workers);
+        Self {
             tables: Tables::new(&blocks, interactions, homes as usize),
             register: Register::new(&blocks),
             room: Room::of(blocks.iter()),
@@ -45,30 +37,21 @@ impl Layout {
             blocking,
             homes,
             workers,
-        })
+        }
     }
 
     /// Forms more blocks and homes if there are more workers than they are for; fewer work on as many as there are.
     /// What tables have grown to for objects' contacts and letters they keep.
-    ///
-    /// # Errors
-    /// None but those with which it would not have been made.
-    pub(super) fn suit(
-        &mut self,
-        workers: usize,
-        stages: &Stages,
-        grain: Grain,
-    ) -> Result<(), BlockingError> {
+    pub(super) fn suit(&mut self, workers: usize, stages: &Stages, grain: Grain) {
         if workers > self.workers {
             let objects = self.blocks.drain(..).flat_map(|block| block.objects).collect();
             let Formed { blocking, blocks, interactions, homes } =
-                Formed::new(objects, stages, grain, workers)?;
+                Formed::new(objects, stages, grain, workers);
             self.tables.model(interactions, blocks.len(), homes as usize);
             (self.register, self.room) = (Register::new(&blocks), Room::of(blocks.iter()));
             (self.blocks, self.blocking) = (blocks, blocking);
             (self.homes, self.workers) = (homes, workers);
         }
-        Ok(())
     }
 
     /// Gives a table more room, for so much.
@@ -92,14 +75,9 @@ struct Formed {
 }
 
 impl Formed {
-    fn new(
-        objects: Vec<Object>,
-        stages: &Stages,
-        grain: Grain,
-        workers: usize,
-    ) -> Result<Self, BlockingError> {
+    fn new(objects: Vec<Object>, stages: &Stages, grain: Grain, workers: usize) -> Self {
         let homes = homes(workers);
-        let (mut blocking, mut blocks) = Blocking::new(objects, grain, workers)?;
+        let (mut blocking, mut blocks) = Blocking::group(objects, grain, workers);
         let interactions = match grain {
             Grain::Spatial => {
                 blocks.iter_mut().for_each(|block| blocking.drain(block));
@@ -111,7 +89,7 @@ impl Formed {
             }
             Grain::Pairwise => modelled_interactions(stages, &blocks),
         };
-        Ok(Self { blocking, blocks, interactions, homes })
+        Self { blocking, blocks, interactions, homes }
     }
 }
 

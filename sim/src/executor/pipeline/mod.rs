@@ -31,7 +31,7 @@ use self::overflow::Overflow;
 use self::run::{Context, End, Regrouping, Report};
 use self::team::Team;
 use super::outside::Outside;
-use super::{Executor, ExecutorError, FrameRecord, OnFrame, StageSeconds, world};
+use super::{Executor, ExecutorError, FrameRecord, OnFrame, Refused, StageSeconds, world};
 use crate::block::Block;
 use crate::blocking::Grain;
 use crate::cost::Cost;
@@ -80,11 +80,11 @@ impl PipelineExecutor {
         grain: Grain,
         entry: Entry,
         pool: Arc<Pool>,
-    ) -> Result<Self, ExecutorError> {
+    ) -> Result<Self, Box<Refused>> {
+        let threads = pool.threads();
+        let (scene, team) = Refused::unless(scene, grain, threads, || Team::of(threads))?;
         let Scene { objects, stages, frame, mail: under_way, mailbox } = scene;
-        let mut team = Team::default();
-        team.grow(pool.threads())?;
-        let layout = Layout::new(objects, &stages, grain, pool.threads())?;
+        let layout = Layout::new(objects, &stages, grain, threads);
         let mut mail = Vec::new();
         let outside = Outside::new(mailbox, under_way, frame, |from, to, message| {
             let from = From { sender: from.0, sequence: mail.len() as u32 };
@@ -202,7 +202,7 @@ impl Executor for PipelineExecutor {
             }
             let workers = self.pool.threads();
             self.team.grow(workers)?;
-            self.layout.suit(workers, &self.stages, self.grain)?;
+            self.layout.suit(workers, &self.stages, self.grain);
             let frames = (end - self.frame).min(MOST_FRAMES);
             if let End::Outgrown(table, to) = self.run(workers, frames, renderer, on_frame)? {
                 self.layout.grow(table, to);

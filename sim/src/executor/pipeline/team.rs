@@ -51,6 +51,16 @@ impl Drop for Hired {
 }
 
 impl Team {
+    /// So many workers.
+    ///
+    /// # Errors
+    /// The system gave no thread.
+    pub(super) fn of(workers: usize) -> Result<Self, ExecutorError> {
+        let mut team = Self::default();
+        team.grow(workers)?;
+        Ok(team)
+    }
+
     /// Hires threads until there are so many workers. What those that there were work in is kept.
     ///
     /// # Errors

@@ -12,7 +12,6 @@ use super::{SKULL, TIME_STEP, TOOLS, freeing};
 use crate::behavior::Bone;
 use crate::device::link::{SimulationEnd, ToolState};
 use crate::device::motion::Motion;
-use crate::executor::ExecutorError;
 use crate::geometry::Bounds;
 use crate::mailbox::Mailbox;
 use crate::manager::VeManager;
@@ -141,8 +140,8 @@ impl<'c> Operation<'c> {
     /// one of the same settings, which `manage` makes, and how many objects are new.
     ///
     /// # Errors
-    /// As [`VeManager::new`].
-    pub fn look<E: From<ExecutorError>>(
+    /// Those of `manage`, which has the environment then.
+    pub fn look<E>(
         &mut self,
         manager: VeManager,
         manage: impl FnOnce(Scene) -> Result<VeManager, E>,

@@ -1,0 +1,92 @@
+//! A scene that no executor could be made of comes back as it was.
+#![forbid(unsafe_code)]
+
+use dualframe_sim::blocking::Grain;
+use dualframe_sim::executor::{Entry, ExecutorError, ExecutorKind, MAX_THREADS, Refused};
+use dualframe_sim::manager::{Settings, VeManager};
+use dualframe_sim::render::NullRenderer;
+use dualframe_sim::scene::{ParticleScene, Scene};
+
+/// Frames before and after.
+const FRAMES: u64 = 40;
+const SERIAL: Settings = settings(ExecutorKind::Serial, 1);
+
+const fn settings(executor: ExecutorKind, threads: usize) -> Settings {
+    Settings { executor, threads, pinned: false, grain: Grain::Spatial, entry: Entry::AfterUpdate }
+}
+
+/// A scene that has run for some frames.
+fn scene() -> Scene {
+    let scene = ParticleScene { gravity: true, ..ParticleScene::new(50) };
+    run(scene.build().expect("a valid scene"), SERIAL).into_scene()
+}
+
+fn run(scene: Scene, settings: Settings) -> VeManager {
+    let mut manager = VeManager::new(scene, settings).expect("valid settings");
+    manager.run(FRAMES, &mut NullRenderer::new(), &mut |_| ()).expect("it goes on");
+    manager
+}
+
+fn refused(scene: Scene, settings: Settings) -> Refused {
+    let Err(refused) = VeManager::new(scene, settings) else { panic!("not refused: {settings:?}") };
+    *refused
+}
+
+#[test]
+fn a_number_of_threads_beyond_its_limits() {
+    let expected = run(scene(), SERIAL).state_hash();
+    for &executor in ExecutorKind::ALL {
+        for threads in [0, MAX_THREADS + 1] {
+            let Refused { scene, error } = refused(scene(), settings(executor, threads));
+            assert!(matches!(error, ExecutorError::Threads { threads: n } if n == threads));
+            assert_eq!(scene.frame, FRAMES);
+            assert_eq!(run(scene, settings(executor, 2)).state_hash(), expected, "{executor:?}");
+        }
+    }
+}
+
+#[test]
+fn objects_that_cannot_be_grouped() {
+    let expected = run(scene(), SERIAL).state_hash();
+    for &executor in ExecutorKind::ALL {
+        let mut scene = scene();
+        let missing = scene.objects.remove(20);
+        let Refused { mut scene, error } = refused(scene, settings(executor, 2));
+        assert!(matches!(error, ExecutorError::Blocking(_)), "{executor:?}: {error}");
+        scene.objects.push(missing);
+        assert_eq!(run(scene, settings(executor, 2)).state_hash(), expected, "{executor:?}");
+    }
+}
+
+/// [`threads_that_cannot_be_had`].
+#[cfg(unix)]
+#[test]
+#[ignore = "run by another test, within limits"]
+fn without_memory_for_threads() {
+    let expected = run(scene(), SERIAL).state_hash();
+    for executor in [
+        ExecutorKind::Pipeline,
+        ExecutorKind::Static,
+        ExecutorKind::Rayon,
+        ExecutorKind::RayonOverlapped,
+    ] {
+        let Refused { scene, error } = refused(scene(), settings(executor, MAX_THREADS));
+        let is_of_threads = matches!(error, ExecutorError::Spawn(_) | ExecutorError::Pool(_));
+        assert!(is_of_threads, "{executor:?}: {error:?}");
+        assert_eq!(run(scene, SERIAL).state_hash(), expected, "{executor:?}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn threads_that_cannot_be_had() {
+    let test = std::env::current_exe().expect("this one");
+    // Half of what 256 threads' stacks of 2 MiB take.
+    let script = "ulimit -v 262144; exec \"$0\" --ignored --exact without_memory_for_threads";
+    let child = std::process::Command::new("sh")
+        .args(["-c".as_ref(), script.as_ref(), test.as_os_str()])
+        .output()
+        .expect("there is a shell");
+    let said = String::from_utf8_lossy(&child.stdout);
+    assert!(child.status.success() && said.contains("1 passed"), "{child:?}");
+}
