@@ -14,6 +14,8 @@
 //! | [`springs`] | mass–spring bodies whose springs the device integrates |
 //! | [`error`] | what can go wrong |
 //!
+//! `examples/own_picture.rs` draws a scene of one's own.
+//!
 //! The `dualframe` program is in this package too, behind the feature `app`, which is on by default.
 #![forbid(unsafe_code)]
 
