@@ -116,6 +116,26 @@ fn a_run_begins_with_nobody_hungry() {
     });
 }
 
+#[test]
+fn a_run_begins_with_nobody_who_has_the_shared_renderer() {
+    let calls = Calls::default();
+    let void = Void { calls: &calls, before_entry: AtomicU32::new(0) };
+    with_pipeline(&calls, 1, |mut pipeline| {
+        assert!(pipeline.share(()).is_ok());
+        for _ in 0..2 {
+            assert_eq!(pipeline.run(1), Ok(()));
+            let mut worker = pipeline.worker();
+            let mut steps = 0..100;
+            while !pipeline.finished() && steps.next().is_some() {
+                assert!(worker.step(&void).is_ok());
+            }
+            assert!(pipeline.finished());
+            // It would put the renderer back at its next step.
+            ::core::mem::forget(worker);
+        }
+    });
+}
+
 /// A holder's step finds a unit in a queue that it may not be rendered from, and another holder looks in vain
 /// meanwhile and is about to sleep. What the step did, the calls at the first entry and after the step.
 fn put_back(frames: u32) -> (Step, u32, u32) {

@@ -52,7 +52,7 @@ impl<M> Default for LetterSlot<M> {
 pub struct From {
     /// The sender's number, chosen by the host.
     pub sender: u32,
-    /// Counts the sender's letters of a frame.
+    /// Counts the sender's letters of a frame; one from outside, who cannot know the frame, counts all of its letters.
     pub sequence: u32,
 }
 

@@ -104,7 +104,7 @@ impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
 
     /// Posts a letter to `to`, who processes it in the next frame's update. Letters of one update
     /// keep their order. Only one unit may post under a `sender` number in a frame: letters of the
-    /// same sender and place in the sequence would come in the order of arrival.
+    /// same sender and place in the sequence would come in an order that depends on the schedule.
     ///
     /// # Errors
     /// [`Rejected`] with the letter if all letters are under way, or if there is no unit `to`.

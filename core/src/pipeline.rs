@@ -91,7 +91,8 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     }
 
     /// Lets frames run without end: for a machine that never stops, or whose pipeline is shared for good, so that
-    /// nobody can let more frames run. Who wants an end steps no worker any more.
+    /// nobody can let more frames run. Who wants an end steps no worker any more; those that sleep are woken by the
+    /// host, whose [`Waiting::sleep`] may return at any time.
     ///
     /// # Errors
     /// [`StillRunning`] if the frames let run before have not all been swapped.
@@ -104,6 +105,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
             return Err(StillRunning);
         }
         self.bells.forget_hunger();
+        self.shared.regain();
         self.window.limit = limit;
         if !self.finished() {
             let units = 0..self.tables.units.len() as u32;

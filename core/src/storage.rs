@@ -61,7 +61,8 @@ impl<O> UnitSlot<O> {
 
     const_fn! {
         /// A unit that never interacts, neither with others nor within itself: it bypasses the first two stages
-        /// (§5.1). Under modelled interactions every unit without any does, whether made so or not.
+        /// (§5.1). Under modelled interactions every unit without any does, and none with one, whether made so or
+        /// not.
         pub const fn solitary(object: O) -> Self {
             let mut slot = Self::new(object);
             slot.solitary = true;

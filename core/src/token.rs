@@ -116,6 +116,11 @@ impl<R> Shared<R> {
         self.renderer.get_mut().take()
     }
 
+    /// Nobody has it: by exclusive access no worker is left, though one that was forgotten may have had it.
+    pub(crate) fn regain(&mut self) {
+        self.free.store(u32::from(self.offered), site::EXCLUSIVE);
+    }
+
     #[inline]
     pub(crate) fn is_offered(&self) -> bool {
         self.offered

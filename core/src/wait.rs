@@ -8,6 +8,35 @@
 use crate::sync::{Atomic, CachePadded, fence, seeded, site};
 
 /// How a host's workers sleep and are woken.
+///
+/// With threads, a condition variable for each bell:
+///
+/// ```
+/// use dualframe_core::wait::{Bell, Epoch, Waiting};
+/// use std::sync::{Condvar, Mutex, PoisonError};
+///
+/// #[derive(Default)]
+/// struct Park {
+///     lock: Mutex<()>,
+///     rung: [Condvar; 2],
+/// }
+///
+/// impl Waiting for Park {
+///     fn sleep(&self, bell: &Bell, seen: Epoch) {
+///         let rung = &self.rung[usize::from(bell.is_for_holders())];
+///         let lock = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
+///         let woken = rung.wait_while(lock, |()| !bell.rung_since(seen));
+///         drop(woken.unwrap_or_else(PoisonError::into_inner));
+///     }
+///
+///     fn wake(&self, bell: &Bell, count: u32) {
+///         // Whoever did not see the ring yet waits for its notice once the lock can be had.
+///         drop(self.lock.lock().unwrap_or_else(PoisonError::into_inner));
+///         let rung = &self.rung[usize::from(bell.is_for_holders())];
+///         (0..count).for_each(|_| rung.notify_one());
+///     }
+/// }
+/// ```
 pub trait Waiting: Sync {
     /// Returns once `bell` has been rung past `seen`; may return earlier.
     fn sleep(&self, bell: &Bell, seen: Epoch);

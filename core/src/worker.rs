@@ -174,7 +174,8 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         None
     }
 
-    /// Whether a step would find work now, or the pipeline is at rest.
+    /// Whether a step would find work now, or this worker has the shared renderer to put back, or the pipeline is at
+    /// rest.
     pub fn has_cause_to_wake(&self) -> bool {
         let pipeline = self.carry.pipeline;
         let renders = self.token.is_some() || pipeline.shared.is_free();
