@@ -100,9 +100,14 @@ pub(super) fn scene(
 ) -> Scene {
     let mut objects: Vec<Object> = objects.collect();
     objects.sort_unstable_by_key(Object::id);
-    let mail = mail.chain(outside.take_letters(frame));
-    // What was sent to nobody is not for an object that is added.
-    let mail = mail.filter(|letter| (letter.to.0 as usize) < objects.len()).collect();
+    // What was sent to nobody is not for an object that is added. From outside it keeps its place: nothing that is
+    // posted later comes before it.
+    let is_for_somebody = |letter: &Letter| (letter.to.0 as usize) < objects.len();
+    let from_outside = outside.take_letters(frame).map(|letter| match is_for_somebody(&letter) {
+        true => letter,
+        false => Letter { to: ObjectId::HOST, ..letter },
+    });
+    let mail = mail.filter(is_for_somebody).chain(from_outside).collect();
     Scene { objects, stages, frame, mail, mailbox: outside.mailbox().clone() }
 }
 

@@ -16,7 +16,7 @@ use crate::object::Object;
 /// Finds where a free piece of bone touches other bone, or is about to within a frame. The pair's first
 /// object is the piece ([`Piece`]), the second a volume.
 ///
-/// The piece is looked at by points on its surface, each of which reaches half a voxel, and goes along
+/// The piece is looked at by points on its surface, each of which reaches half a voxel towards the bone, and goes along
 /// with it for a frame in steps of a voxel; a touch's node is the point's number, its depth less than 0 by
 /// how far it has to go yet.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +31,7 @@ impl Detection for PieceInBone {
         let Some(bone) = second.geometry.as_volume() else { return };
         let center = piece.body().center(own);
         let spin = piece.body().angular_velocity(own);
+        let reach = 0.5 * own.spacing().min_element();
         for (number, &sample) in piece.samples().iter().enumerate() {
             let place = own.to_world(sample);
             // A point that was drilled away stands for nothing any more.
@@ -38,10 +39,10 @@ impl Detection for PieceInBone {
                 continue;
             }
             let way = (piece.body().velocity + spin.cross(place - center)) * self.time_step;
-            let Some((gap, normal)) = way_to(bone, place, way) else { continue };
-            let depth = 0.5 * own.spacing().min_element() - gap;
+            let towards = bone.gradient_at(place).normalize_or_zero() * reach;
+            let Some((gap, normal)) = way_to(bone, place, way + towards) else { continue };
             let nodes = [number as u32, Contact::BODY];
-            touches.push(Touch { nodes, normal: normal.to_array(), depth });
+            touches.push(Touch { nodes, normal: normal.to_array(), depth: reach - gap });
         }
     }
 }

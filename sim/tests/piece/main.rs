@@ -169,6 +169,35 @@ fn rests_on_bone() {
 }
 
 #[test]
+fn is_held_by_friction_at_any_time_step() {
+    // Steeper than this it slides: 0.4.
+    let slope = 0.2_f32.atan();
+    for frames in [60_u16, 240, 1_000] {
+        let time_step = 1.0 / f32::from(frames);
+        let mut stages = Stages { time_step, ..no_rules() };
+        stages.gravity = 9.81 * Vec3::new(slope.sin(), 0.0, -slope.cos());
+        let pair = InteractionPair {
+            detection: Box::new(PieceInBone { time_step }),
+            response: Box::new(PieceOnBone { friction: 0.4 }),
+        };
+        stages.rules.model(Group(0), Group(1), pair).expect("its first rule");
+        let volume = flap(Pose::from_translation(Vec3::new(-0.01, -0.0075, -4e-4)));
+        let piece = Piece::new(&volume).loose();
+        let object = Object::new(ObjectId(0), Group(0), Geometry::Volume(volume), piece);
+        let mut executor = serial(Scene::new(vec![object, floor()], stages));
+        run(&mut executor, frames.into());
+        let before = center(&executor);
+        for _ in 0..frames {
+            run(&mut executor, 1);
+            let low = lowest(&executor);
+            assert!(low.abs() < 5e-5, "{low} m over the bone, {frames} frames a second");
+        }
+        let moved = (center(&executor) - before).length();
+        assert!(moved < 2e-5, "{moved} m in a second of rest, {frames} frames a second");
+    }
+}
+
+#[test]
 fn does_not_fall_through() {
     // From half a metre it comes at 3 m/s, 5 cm a frame, on 10 mm of bone.
     let mut executor =

@@ -2,7 +2,7 @@
 
 use dualframe_sim::behavior::tissue::{Material, Pin, Tissue};
 use dualframe_sim::executor::Executor;
-use dualframe_sim::geometry::Mesh;
+use dualframe_sim::geometry::{Mesh, icosphere};
 use dualframe_sim::message::Message;
 use glam::Vec3;
 
@@ -40,6 +40,46 @@ fn stretched_threefold_and_crumpled_it_stays_stable() {
         let fastest =
             look(&executor, |_, mesh| mesh.velocities.iter().map(Vec3::length).fold(0.0, f32::max));
         assert!(fastest < 100.0, "{fastest} m/s in frame {frame}");
+    }
+}
+
+/// A ball of 50 mm, one of whose faces is finer than the others: cuts make light nodes like these too.
+fn ball_with_a_finer_face() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let (mut nodes, mut triangles) = icosphere(0.05);
+    let mut outer = triangles.swap_remove(0);
+    let corners = outer.map(|node| nodes[node as usize]);
+    let middle = corners.iter().sum::<Vec3>() / 3.0;
+    for scale in [0.2, 0.1] {
+        let first = nodes.len() as u32;
+        nodes.extend(corners.map(|corner| middle + (corner - middle) * scale));
+        let inner = [first, first + 1, first + 2];
+        for (side, next) in [(0, 1), (1, 2), (2, 0)] {
+            triangles.push([outer[side], outer[next], inner[side]]);
+            triangles.push([outer[next], inner[next], inner[side]]);
+        }
+        outer = inner;
+    }
+    triangles.push(outer);
+    (nodes, triangles)
+}
+
+#[test]
+fn a_solid_body_whose_nodes_differ_in_mass_comes_to_rest() {
+    for stiffness in [200.0, 5_000.0, 100_000.0] {
+        let (rest, triangles) = ball_with_a_finer_face();
+        let material =
+            Material { stiffness, bending: 0.0, to_center: stiffness, damping: 2.0, ..scalp() };
+        let (mesh, tissue) = Tissue::new(&rest, triangles, material, 1e-3, 16).expect("a ball");
+        let masses = mesh.masses();
+        let least = masses.iter().copied().fold(f32::INFINITY, f32::min);
+        assert!(masses.iter().sum::<f32>() > 100.0 * least * masses.len() as f32);
+        let mut executor = alone(mesh, tissue, Vec3::ZERO);
+        let impulse = [1e-6, 0.0, 0.0];
+        executor.mailbox().post(PATCH, Message::Impulse { node: 5, impulse });
+        run(&mut executor, 300);
+        let fastest =
+            look(&executor, |_, mesh| mesh.velocities.iter().map(Vec3::length).fold(0.0, f32::max));
+        assert!(fastest < 1e-3, "{fastest} m/s at {stiffness} N/m");
     }
 }
 

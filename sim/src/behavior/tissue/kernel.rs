@@ -143,21 +143,22 @@ fn correct(block: &Block, positions: &mut [Quad]) {
 }
 
 impl ToCenter<'_> {
-    /// Corrects all springs to the centre at once. Each is a constraint of its node with the mean of all
-    /// nodes as it was; what pulls at the mean, all nodes take up in equal shares, so that momentum is
-    /// kept. Unlike a constraint of the volume, they also keep the shape, and go on doing so when the
-    /// surface is cut open.
+    /// Corrects all springs to the centre at once. Each is a constraint of its node with the centre of mass as it
+    /// was; what pulls at that, all nodes give back by the same way, so that momentum is kept and no light node is
+    /// thrown by what heavy ones pull. Unlike a constraint of the volume, they also keep the shape, and go on doing so
+    /// when the surface is cut open.
     #[inline(always)]
     fn correct(self, positions: &mut [Quad]) {
         let positions = &mut positions[..self.rest.len()];
-        let share = 1.0 / positions.len() as f32;
-        let mut center = [0.0; 4];
+        let (mut center, mut whole) = ([0.0; 4], 0.0);
         for position in &*positions {
+            let mass = 1.0 / position[3];
+            whole += mass;
             for axis in 0..4 {
-                center[axis] += position[axis];
+                center[axis] += position[axis] * mass;
             }
         }
-        center = center.map(|sum| sum * share);
+        center = center.map(|sum| sum / whole);
         let mut total = [0.0; 4];
         for (position, &rest) in positions.iter().zip(self.rest) {
             let pull = self.pull(position, rest, &center);
@@ -165,12 +166,12 @@ impl ToCenter<'_> {
                 total[axis] += pull[axis];
             }
         }
-        let back = total.map(|sum| sum * share);
+        let back = total.map(|sum| sum / whole);
         for (position, &rest) in positions.iter_mut().zip(self.rest) {
             let pull = self.pull(position, rest, &center);
             let inverse_mass = position[3];
             for axis in 0..4 {
-                position[axis] += (pull[axis] - back[axis]) * inverse_mass;
+                position[axis] += pull[axis] * inverse_mass - back[axis];
             }
         }
     }

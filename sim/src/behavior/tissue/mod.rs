@@ -54,6 +54,8 @@ pub struct Tissue {
     rest: Vec<Vec3>,
     edges: Springs,
     bending: Springs,
+    /// The nodes' distances from the centre of mass at rest, in metres.
+    to_center: Vec<f32>,
     /// The time of a substep that the springs are fitted to, in seconds; 0 for none yet.
     fitted: f32,
     anchors: Anchors,
@@ -107,6 +109,7 @@ impl Tissue {
             rest: rest.to_vec(),
             edges: Springs::default(),
             bending: Springs::default(),
+            to_center: Vec::new(),
             fitted: 0.0,
             anchors: Anchors::default(),
             slits: Vec::new(),
@@ -208,6 +211,7 @@ impl Tissue {
         self.edges = Springs::new(nodes, topology.springs());
         self.bending =
             Springs::new(nodes, if self.material.bending > 0.0 { &bending } else { &[] });
+        self.to_center = shape::to_center(&self.rest, &masses);
         self.fitted = 0.0;
         self.digest = shape::digest(&self.rest, triangles, &self.slits);
         Ok(Mesh::new(Arc::new(topology), positions, &masses, contact_radius)?)
@@ -299,7 +303,8 @@ impl Behavior for Tissue {
         self.nodes.load(mesh);
         let gravity = if self.weightless { Vec3::ZERO } else { input.gravity };
         let compliance = 1.0 / (self.material.to_center * time * time);
-        let to_center = mesh.topology().center_rest().map(|rest| ToCenter { rest, compliance });
+        let is_solid = mesh.topology().center_rest().is_some();
+        let to_center = is_solid.then_some(ToCenter { rest: &self.to_center, compliance });
         input.simd.run(Advance {
             nodes: &mut self.nodes,
             springs: [&self.edges.blocks, &self.bending.blocks],

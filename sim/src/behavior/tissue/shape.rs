@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use fnv::FnvHasher;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::hash::Hasher;
 
 use super::material::TissueError;
@@ -28,6 +28,14 @@ pub(super) fn masses(rest: &[Vec3], triangles: &[[u32; 3]], area_density: f32) -
         triangle.into_iter().for_each(|node| masses[node as usize] += third);
     }
     masses.into_iter().map(|mass| mass as f32).collect()
+}
+
+/// The nodes' distances from their centre of mass, in metres.
+pub(super) fn to_center(rest: &[Vec3], masses: &[f32]) -> Vec<f32> {
+    let moments = rest.iter().zip(masses).map(|(node, &mass)| node.as_dvec3() * f64::from(mass));
+    let whole: f64 = masses.iter().copied().map(f64::from).sum();
+    let center = (moments.sum::<DVec3>() / whole).as_vec3();
+    rest.iter().map(|node| node.distance(center)).collect()
 }
 
 /// The springs that resist bending: one from far corner to far corner of two triangles with a common
