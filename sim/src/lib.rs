@@ -63,6 +63,7 @@ pub mod manager;
 pub mod message;
 mod mix;
 pub mod object;
+mod parallel;
 pub mod pool;
 pub mod record;
 pub mod render;

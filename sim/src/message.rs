@@ -11,7 +11,8 @@ use crate::object::{Object, ObjectId};
 /// of posting.
 #[derive(Debug)]
 pub enum Message {
-    /// Changes the velocity of one node. Nodes that do not exist are ignored.
+    /// Changes the velocity of one node of a deformable body. Nodes that do not exist are ignored, and other bodies; the
+    /// behaviour is not asked. An impulse that is not finite is the end of the object: it is quarantined.
     Impulse {
         /// The node.
         node: u32,

@@ -41,7 +41,8 @@ impl std::ops::AddAssign for PairCount {
 pub struct Stages {
     /// The modelled interactions.
     pub rules: Rules,
-    /// The time from one frame to the next, in seconds.
+    /// The time from one frame to the next, in seconds; greater than 0 and finite. With others most behaviours come to
+    /// states that are not finite, and their objects are quarantined.
     pub time_step: f32,
     /// The acceleration of gravity, in metres per second squared.
     pub gravity: Vec3,

@@ -9,7 +9,7 @@ use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::plan::{Plan, Retraction, Sweep};
 use dualframe_sim::experiment::race::Runner;
 use dualframe_sim::experiment::subject::Subject;
-use dualframe_sim::experiment::{Experiment, PAGE, run};
+use dualframe_sim::experiment::{Experiment, Findings, PAGE, run};
 use dualframe_sim::manager::VeManager;
 use dualframe_sim::render::NullRenderer;
 use dualframe_sim::scene::craniotomy::{OBJECTS, TOOLS};
@@ -33,8 +33,9 @@ fn all_experiments() {
     let out = tempfile::tempdir().expect("a temporary folder");
     let plan = tiny();
     let mut work = 0;
-    let reports = run(&Experiment::ALL, &plan, out.path(), &mut |_, done| work += done)
-        .expect("tiny experiments run");
+    let found = run(&Experiment::ALL, &plan, out.path(), &mut |_, done| work += done);
+    let Findings { reports, written } = found.expect("tiny experiments run");
+    written.expect("the folder takes them");
     let all: u64 = Experiment::ALL.iter().map(|experiment| experiment.work(&plan)).sum();
     assert_eq!(work, all, "progress ends where it should");
 
@@ -93,8 +94,11 @@ fn a_file_that_cannot_be_written_costs_no_other() {
     // A folder stands in its place.
     fs::create_dir(out.path().join("fig15-collisions.svg")).expect("a folder");
     let experiments = [Experiment::PerFrame, Experiment::Compare];
-    let error = run(&experiments, &tiny(), out.path(), &mut |_, _| ()).err();
-    assert!(error.is_some_and(|error| error.to_string().contains("fig15-collisions.svg")));
+    let found = run(&experiments, &tiny(), out.path(), &mut |_, _| ());
+    let Findings { reports, written } = found.expect("tiny experiments run");
+    let error = written.expect_err("it cannot be written");
+    assert!(error.to_string().contains("fig15-collisions.svg"), "{error}");
+    assert_eq!(reports.len(), 2);
     for name in ["fig15-collisions.png", "fig15-speed-up.svg", "compare.csv", PAGE] {
         assert!(out.path().join(name).is_file(), "{name}");
     }

@@ -15,7 +15,6 @@ use dualframe_sim::executor::{ExecutorError, FrameRecord, OnFrame};
 use dualframe_sim::geometry::{Bounds, Volume};
 use dualframe_sim::image;
 use dualframe_sim::manager::VeManager;
-use dualframe_sim::record::RecordError;
 use dualframe_sim::render::{NullRenderer, Renderer};
 use dualframe_sim::scene::Scene;
 use dualframe_sim::scene::craniotomy::{
@@ -85,7 +84,7 @@ fn run_beside<'c>(
     };
     let (manager, surgery, measure) = match window {
         Some(window) => {
-            let recording = begin(&manager)?;
+            let recording = begin(&manager);
             let mut measure = Measure::new(args.frames, count);
             measure.start();
             let picture = outputs.picture.as_deref();
@@ -112,7 +111,7 @@ fn run_unwatched<'a, 'c, 'h>(
     (args, patient, outputs): (&CraniotomyArgs, &Patient, &Outputs),
     links: &'h mut Each<HapticLink>,
     (mut manager, manage): (VeManager, Manage<'_>),
-    begin: impl FnOnce(&VeManager) -> Result<Recording<'a>, RecordError>,
+    begin: impl FnOnce(&VeManager) -> Recording<'a>,
     count: AllocationCounter<'c>,
     told: &Told,
 ) -> Result<(VeManager, Surgery<'h>, Measure<'c>), RunError> {
@@ -122,7 +121,7 @@ fn run_unwatched<'a, 'c, 'h>(
     }
     let frames = args.frames.unwrap_or_else(|| surgery.frames());
     let mut pictures = Pictures::new(&args.products, frames, look(surgery.region()), told)?;
-    let mut recording = begin(&manager)?;
+    let mut recording = begin(&manager);
     let mut unwatched = NullRenderer::new();
     let mut progress = Progress::begin(frames, count);
     while manager.frame() < frames {

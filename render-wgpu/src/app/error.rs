@@ -33,7 +33,7 @@ pub(super) enum RunError {
     Json(#[source] io::Error),
     #[error(transparent)]
     Record(#[from] RecordError),
-    #[error("the recording ends before frame {frame}")]
+    #[error("the recording failed before frame {frame}; it is whole up to an earlier one")]
     Recording {
         frame: u64,
         #[source]

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::machine::Machine;
-use dualframe_sim::experiment::{self, PAGE, Report};
+use dualframe_sim::experiment::{self, Findings, PAGE, Report};
 
 use super::args::ExperimentArgs;
 use super::error::RunError;
@@ -20,16 +20,16 @@ pub(super) fn prepare(out: &Path) -> Result<(), String> {
 }
 
 /// Runs the experiments that `args` ask for.
-pub(super) fn run(args: &ExperimentArgs) -> Result<Vec<Report>, ExperimentError> {
+pub(super) fn run(args: &ExperimentArgs) -> Result<Findings, ExperimentError> {
     let (experiments, plan) = (args.experiments(), args.plan());
     let work = experiments.iter().map(|experiment| experiment.work(&plan)).sum();
     let bar = progress::of_work(work);
-    let reports = experiment::run(&experiments, &plan, &args.out, &mut |experiment, done| {
+    let findings = experiment::run(&experiments, &plan, &args.out, &mut |experiment, done| {
         bar.set_message(experiment.name());
         bar.inc(done);
     })?;
     bar.finish_and_clear();
-    Ok(reports)
+    Ok(findings)
 }
 
 /// Prints what was found.

@@ -22,6 +22,8 @@ mod window;
 use std::error::Error;
 use std::process::ExitCode;
 
+use dualframe_sim::experiment::Findings;
+
 use self::args::{CraniotomyArgs, ExperimentArgs, Outcome, Particles, ReplayArgs};
 use self::error::RunError;
 use self::outputs::{Output, Outputs};
@@ -57,7 +59,13 @@ fn run_experiments(args: &ExperimentArgs) -> ExitCode {
     }
     let told = Told::default();
     match experiment::run(args) {
-        Ok(reports) => drop(told.attempt(experiment::print(&reports, args))),
+        Ok(Findings { reports, written }) => {
+            told.attempt(experiment::print(&reports, args));
+            if let Err(error) = written {
+                told.note(&with_causes(&error));
+                told.end_with(UNSOUND);
+            }
+        }
         Err(error) => return fail(&with_causes(&error), UNSOUND),
     }
     told.status()
@@ -124,11 +132,12 @@ fn end(report: Result<Report, RunError>, outputs: &Outputs, told: &Told) -> Exit
     told.status()
 }
 
-/// An error and what it came from, in one line.
+/// An error and what it came from, in one line. What an error says of its cause is said once.
 fn with_causes(error: &dyn Error) -> String {
-    match error.source() {
-        Some(cause) => format!("{error}: {}", with_causes(cause)),
-        None => error.to_string(),
+    let said = error.to_string();
+    match error.source().map(with_causes) {
+        Some(cause) if !said.ends_with(&cause) => format!("{said}: {cause}"),
+        _ => said,
     }
 }
 

@@ -6,7 +6,6 @@ use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::ExecutorKind;
 use dualframe_sim::geometry::Bounds;
 use dualframe_sim::manager::{Settings, VeManager};
-use dualframe_sim::record::RecordError;
 use dualframe_sim::render::{NullRenderer, Renderer};
 use dualframe_sim::scene::{ParticleScene, Scene, SceneError};
 
@@ -55,7 +54,7 @@ pub(super) fn run(
     let manager = manage(build(args)?, settings, timeline.as_ref())?;
     let report = match window {
         Some(window) => {
-            let recording = begin_recording(args, outputs, &manager, told)?;
+            let recording = begin_recording(args, outputs, &manager, told);
             let mut measure = Measure::new(args.frames, count);
             measure.start();
             let picture = outputs.picture.as_deref();
@@ -74,7 +73,7 @@ fn begin_recording<'a>(
     outputs: &'a Outputs,
     manager: &VeManager,
     told: &'a Told,
-) -> Result<Recording<'a>, RecordError> {
+) -> Recording<'a> {
     let spec = scene_of(args, args.objects);
     Recording::begin(outputs.record.as_deref(), &spec, manager, told)
 }
@@ -95,7 +94,7 @@ fn run_unwatched(
     let frames = args.frames();
     let look = look(scene_of(args, args.objects).room());
     let mut pictures = Pictures::new(&args.products, frames, look, told)?;
-    let mut recording = begin_recording(args, outputs, &manager, told)?;
+    let mut recording = begin_recording(args, outputs, &manager, told);
     let mut progress = Progress::begin(frames, count);
     let mut unwatched = NullRenderer::new();
     let renderer: &mut dyn Renderer = match &mut pictures {

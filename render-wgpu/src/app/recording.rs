@@ -20,18 +20,20 @@ pub(super) struct Recording<'a> {
 
 impl<'a> Recording<'a> {
     /// Begins a recording, if there is a file for it, of an environment built as `spec` says. What is in the
-    /// file is gone then: nothing that can be refused may come after it.
+    /// file is gone then: nothing that can be refused may come after it. Where it cannot begin, the session goes on
+    /// without.
     pub(super) fn begin(
         file: Option<&'a File>,
         spec: &impl SceneSpec,
         manager: &VeManager,
         told: &'a Told,
-    ) -> Result<Self, RecordError> {
+    ) -> Self {
         let begin = |file: &'a File| {
             outputs::empty(file)?;
             Recorder::begin(file, &Header::of(spec), manager)
         };
-        Ok(Self { recorder: file.map(begin).transpose()?, told })
+        let begun = file.map(begin).transpose().map_err(RunError::from);
+        Self { recorder: told.attempt(begun).flatten(), told }
     }
 
     /// Advances by so many frames.

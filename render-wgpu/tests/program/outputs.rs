@@ -163,7 +163,7 @@ fn a_recording_that_fails_ends_and_the_session_goes_on() {
     let args = ["--headless", "--objects", "40", "--frames", "150", "--json", &json];
     let output = run(&[&args[..], &["--record", &pipe]].concat());
     reader.join().expect("it was written");
-    failed(&output, &["the recording ends before frame "]);
+    failed(&output, &["the recording failed before frame "]);
     assert_eq!(read_json(json.as_ref())["frames"], 150);
 }
 

@@ -205,5 +205,7 @@ fn what_cannot_be_played() {
     if Path::new("/dev/full").exists() {
         let output = run(&["--headless", "--objects", "5", "--record", "/dev/full"]);
         told(&output, 1, "the recording cannot be written: ");
+        let printed = String::from_utf8_lossy(&output.stdout);
+        assert!(printed.contains("state hash"), "the run goes on without: {printed}");
     }
 }

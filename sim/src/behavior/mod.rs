@@ -53,7 +53,8 @@ pub trait Behavior: Any + Send + Sync {
     /// Processes one of the engine's messages that concerns the behaviour; by default it is ignored.
     fn process(&mut self, _message: &Message) {}
 
-    /// Whether the object is scenery: it is never updated, and told of no contacts.
+    /// Whether the object is scenery: it is never updated, and told of no contacts. The same as long as the behaviour
+    /// is: it is asked when the object is made or taken over by an executor, and not again.
     fn is_fixed(&self) -> bool {
         false
     }

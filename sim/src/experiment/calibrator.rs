@@ -100,11 +100,13 @@ impl Calibrator {
             };
             (0..REPETITIONS).map(once).collect()
         };
-        let (own, other) = thread::scope(|scope| {
-            let other = scope.spawn(repeat);
-            (repeat(), other.join())
+        let both = thread::scope(|scope| {
+            let other = thread::Builder::new().spawn_scoped(scope, repeat).ok()?;
+            let own = repeat();
+            Some((own, other.join().ok()?))
         });
-        let Ok(other) = other else { return 0.0 };
+        // Without a second thread nothing is gained.
+        let Some((own, other)) = both else { return 0.0 };
         // The mean, so that one repetition without a core shows.
         let took: f64 = own.iter().zip(&other).map(|(&own, &other)| together(own, other)).sum();
         2.0 * alone * REPETITIONS as f64 / took
@@ -122,7 +124,9 @@ fn together(one: [Instant; 2], other: [Instant; 2]) -> f64 {
 fn ping_pong() -> f64 {
     let ball = AtomicU32::new(0);
     thread::scope(|scope| {
-        scope.spawn(|| answer(&ball));
+        if thread::Builder::new().spawn_scoped(scope, || answer(&ball)).is_err() {
+            return f64::INFINITY;
+        }
         let began = Instant::now();
         let mut batches = Vec::with_capacity(BATCHES);
         let mut turn = 0;

@@ -154,20 +154,29 @@ pub struct Shown {
     pub paper: &'static str,
 }
 
+/// What experiments found.
+#[derive(Debug)]
+pub struct Findings {
+    /// One of each experiment, in their order.
+    pub reports: Vec<Report>,
+    /// The first file that could not be written, if any could not.
+    pub written: Result<(), ExperimentError>,
+}
+
 /// Runs experiments one after the other and writes into the folder `out`, which must be there: of each
 /// experiment, as soon as it has ended, its tables (CSV) and figures (SVG, PNG), and the page
 /// [`PAGE`] of all that have ended. `progress` is told what is running and how much work was done
 /// since it was told last, in the unit of [`Experiment::work`].
 ///
 /// # Errors
-/// An experiment cannot be run, its runs were not sound, there is no such folder, or a file cannot be written. That one
-/// costs no other: it is told when all is done.
+/// An experiment cannot be run, its runs were not sound, or there is no such folder. A file that cannot be written costs
+/// no other: see [`Findings::written`].
 pub fn run(
     experiments: &[Experiment],
     plan: &Plan,
     out: &Path,
     progress: &mut dyn FnMut(Experiment, u64),
-) -> Result<Vec<Report>, ExperimentError> {
+) -> Result<Findings, ExperimentError> {
     experiments.iter().try_for_each(|experiment| experiment.check(plan))?;
     if !out.is_dir() {
         let source = io::ErrorKind::NotADirectory.into();
@@ -198,7 +207,7 @@ pub fn run(
         reports.push(report);
         write(PAGE, "html", page::page(&machine, plan, &reports).as_bytes());
     }
-    written.map(|()| reports)
+    Ok(Findings { reports, written })
 }
 
 /// What experiments are run with.

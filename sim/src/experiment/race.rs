@@ -14,7 +14,7 @@ use super::outcome::Outcome;
 use super::subject::Subject;
 use super::timing::{Contender, Series};
 use crate::blocking::FRAMES_PER_BLOCKING;
-use crate::executor::{ExecutorKind, FrameRecord};
+use crate::executor::{ExecutorError, ExecutorKind, FrameRecord};
 use crate::manager::VeManager;
 
 /// Frames before the clock starts; usually 32: then caches are warm, and blocks are formed anew, for the first time
@@ -143,8 +143,12 @@ impl Race {
     pub fn independent_gain(&self, threads: usize) -> Result<f64, ExperimentError> {
         let alone = self.seconds(Runner::SERIAL)?;
         let together = thread::scope(|scope| {
-            let run = || scope.spawn(|| self.seconds(Runner::SERIAL));
-            let runs: Vec<_> = (0..threads).map(|_| run()).collect();
+            let run = || {
+                let thread = thread::Builder::new();
+                let run = thread.spawn_scoped(scope, || self.seconds(Runner::SERIAL));
+                run.map_err(ExecutorError::Spawn)
+            };
+            let runs: Vec<_> = (0..threads).map(|_| run()).collect::<Result<_, _>>()?;
             let join = |run: thread::ScopedJoinHandle<'_, _>| {
                 run.join().unwrap_or_else(|panic| resume_unwind(panic))
             };

@@ -25,7 +25,7 @@ impl Rigid {
     }
 
     /// A wall: everything behind the plane through `point` (metres) whose normal, of unit length,
-    /// points into the free room.
+    /// points into the free room. With a normal of another length it is somewhere else, with none it is nowhere.
     #[must_use]
     pub fn wall(point: Vec3, normal: Vec3) -> Self {
         let shape = SharedShape::new(HalfSpace::new(normal));

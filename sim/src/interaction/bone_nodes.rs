@@ -15,7 +15,7 @@ use crate::object::Object;
 /// The distance to the surface is estimated by the density there and its slope, (ρ − ½)/|∇ρ|, which
 /// reaches about a voxel to either side of it and is right to a tenth of a voxel near it. So of a contact sphere no more than a voxel counts, and a
 /// node deep in bone, where every direction is as good, is left alone. Where there is no bone within a voxel
-/// of a node, that costs one look-up of a density.
+/// of a node, that costs one look-up of a density. A node that moves farther than about a voxel in a frame may pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NodesInBone;
 

@@ -13,6 +13,11 @@ use crate::object::Object;
 /// Pushes touching objects apart along the contact's normal, by a spring and a dashpot, and never
 /// pulls; where there is friction, it is Coulomb's, limited so that each touch stops its two ends on each other at most.
 ///
+/// Where two bodies touch as wholes ([`Contact::BODY`] on both sides) only the spring acts, without damping and friction.
+///
+/// The force is that of the frame's beginning: with a node's mass m (kg) and the time step t (s) it is stable while
+/// stiffness · t² / m is below 1 and damping · t / m below 1.5, all contacts of the node together.
+///
 /// Between nodes the force acts along the line of their centres on both alike, so without friction
 /// linear and angular momentum are kept up to rounding.
 #[derive(Clone, Copy, Debug, PartialEq)]

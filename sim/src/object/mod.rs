@@ -23,7 +23,7 @@ pub use visual::{Drawing, VisualProperties};
 pub struct ObjectId(pub u32);
 
 impl ObjectId {
-    /// The sender of messages that come from outside the environment.
+    /// The sender of messages that come from outside the environment. No object has this number.
     pub const HOST: Self = Self(u32::MAX);
 }
 
@@ -33,7 +33,8 @@ impl fmt::Display for ObjectId {
     }
 }
 
-/// The kind of an object, by which the rule table says what interactions are modelled.
+/// The kind of an object, by which the rule table says what interactions are modelled: 0 to 31; what is of a greater one
+/// has no rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Group(pub u8);
 

@@ -51,7 +51,7 @@ pub enum Stop {
 pub enum Control {
     /// The acceleration of gravity, in metres per second squared.
     Gravity(Vec3),
-    /// The time from one frame to the next, in seconds.
+    /// The time from one frame to the next, in seconds; greater than 0 and finite.
     TimeStep(f32),
 }
 

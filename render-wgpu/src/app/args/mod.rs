@@ -31,7 +31,12 @@ const MAX_PAIRWISE: usize = Blocking::MAX_PAIRWISE_OBJECTS - 6;
 
 /// Realtime, physically based virtual environments on all cores.
 #[derive(Parser)]
-#[command(name = "dualframe", version, args_conflicts_with_subcommands = true)]
+#[command(
+    name = "dualframe",
+    version,
+    args_conflicts_with_subcommands = true,
+    allow_negative_numbers = true
+)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,

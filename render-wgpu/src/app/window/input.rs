@@ -123,7 +123,8 @@ impl ApplicationHandler for Input {
             response.consumed
         });
         match event {
-            WindowEvent::CloseRequested | WindowEvent::Destroyed => self.is_closing = true,
+            WindowEvent::CloseRequested => self.is_closing = true,
+            WindowEvent::Destroyed => self.failure = Some("the window was destroyed".to_owned()),
             WindowEvent::Resized(size) => self.size = size,
             WindowEvent::CursorMoved { position, .. } => {
                 let cursor = Vec2::new(position.x as f32, position.y as f32);

@@ -185,6 +185,9 @@ impl<H: Hand> View<H> {
             let reason = "the display is gone".to_owned();
             self.failure.get_or_insert(GraphicsError::Surface { reason });
         }
+        if let Some(reason) = self.input.failure.take() {
+            self.failure.get_or_insert(GraphicsError::Surface { reason });
+        }
         if self.failure().is_some() {
             // It may still be closed, where a display lets no window go.
             self.input.gestures.clear();

@@ -339,10 +339,21 @@ impl Session<'_> {
     }
 
     /// Closes the window of a program that said in one line what went wrong before, and gives back what it reported.
-    pub(crate) fn close_after(mut self, failure: &str) -> Value {
+    pub(crate) fn close_after(self, failure: &str) -> Value {
         self.ask_to_close();
-        let (status, told) = self.wait();
-        assert!(status.code() == Some(1) && told.lines().count() == 1, "{status}: {told}");
+        self.end_after(failure, 1)
+    }
+
+    /// Takes the window away as another program can, of which this one says so in one line, and gives back what it
+    /// reported.
+    pub(crate) fn destroy(self) -> Value {
+        self.desktop.sync(self.desktop.connection.destroy_window(self.window));
+        self.end_after("the window was destroyed", 3)
+    }
+
+    fn end_after(mut self, failure: &str, status: i32) -> Value {
+        let (ended, told) = self.wait();
+        assert!(ended.code() == Some(status) && told.lines().count() == 1, "{ended}: {told}");
         assert!(told.contains(failure), "no {failure:?} in {told}");
         self.report()
     }

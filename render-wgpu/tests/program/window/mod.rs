@@ -247,6 +247,18 @@ fn a_minimized_window_draws_nothing_and_needs_no_more_memory() {
 
 #[test]
 #[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
+fn a_window_that_is_destroyed_leaves_its_run_the_rest() {
+    let desktop = Desktop::start();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let picture = folder.path().join("picture.png");
+    let picture = picture.to_str().expect("a plain path");
+    let asked = ["--objects", "20", "--frames", "2000", "--window", "--size", "320x240"];
+    let session = desktop.open(&[&asked[..], &["--picture", picture]].concat());
+    assert_eq!(session.destroy()["frames"], 2_000);
+}
+
+#[test]
+#[ignore = "needs Xvfb and a graphics adapter; .ci/run has them"]
 fn odd_sizes() {
     let desktop = Desktop::start();
     for size in ["1x1", "16384x1", "1x4000"] {

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rayon::prelude::*;
 
 use crate::mix::mix;
+use crate::parallel::on_all_cores;
 
 /// The side of a brick, in voxels: a brick is a page of 4 KiB, small enough that a drill changes few
 /// of its neighbours, and large enough that its header of 16 bytes and its upload's call weigh little.
@@ -182,7 +183,7 @@ impl Bricks {
             (Header { revision, peak: peak(densities) }, digest)
         };
         let (headers, digests): (Vec<Header>, Vec<u64>) =
-            voxels.par_iter_mut().enumerate().map(fill).unzip();
+            on_all_cores(|| voxels.par_iter_mut().enumerate().map(fill).unzip());
         let digest = digests.into_iter().fold(0, u64::wrapping_add);
         Self { layout, voxels, headers, revision, digest }
     }

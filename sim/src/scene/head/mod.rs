@@ -42,6 +42,7 @@ use self::layers::{Layers, Rays, centered, largest_room};
 use self::skull::{Bone, Lattice};
 use crate::geometry::Volume;
 use crate::image::{self, AIR, Image, Thresholds};
+use crate::parallel::on_all_cores;
 
 pub use self::attachments::Attachment;
 pub use self::error::HeadError;
@@ -111,7 +112,8 @@ impl Head {
         let layers = rays.layers();
         let lattice = Lattice::around(&layers);
         let bone = Bone::new(lattice, rays.bone)?;
-        let (skull, structures) = rayon::join(|| bone.volume(), || structures::structures(&layers));
+        let (skull, structures) =
+            on_all_cores(|| rayon::join(|| bone.volume(), || structures::structures(&layers)));
         let (skull, structures) = (skull?, structures?);
         let attachments = attachments::attachments(&structures);
         let plan = Plan::new(&layers, &skull);

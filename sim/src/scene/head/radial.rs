@@ -5,6 +5,8 @@ use std::cmp::Ordering;
 use glam::Vec3;
 use rayon::prelude::*;
 
+use crate::parallel::on_all_cores;
+
 /// The cells along an edge of the cube; 64 give steps of 1.8° at most, 2.6 mm on a skull.
 const CELLS: usize = 64;
 /// The nodes along an edge of the cube.
@@ -29,7 +31,7 @@ impl RadialMap {
         radii: impl Fn(Vec3) -> [f32; N] + Send + Sync,
     ) -> [Self; N] {
         let directions: Vec<Vec3> = directions().collect();
-        let all: Vec<[f32; N]> = directions.into_par_iter().map(radii).collect();
+        let all: Vec<[f32; N]> = on_all_cores(|| directions.into_par_iter().map(radii).collect());
         std::array::from_fn(|map| Self(all.iter().map(|radii| radii[map]).collect()))
     }
 

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::image::{AIR, Grid, Image, ImageError};
 use crate::mix::mix;
+use crate::parallel::on_all_cores;
 
 /// The distance between voxels, in millimetres; usually 1.5.
 const VOXEL: f32 = 1.5;
@@ -47,7 +48,7 @@ pub fn synthetic_ct() -> Result<Image, ImageError> {
         let index = Vec3::new(x as f32, y as f32, z as f32);
         (hounsfield((index - Vec3::from(MIDDLE)) * VOXEL) + 0.7 * noise) as i16
     };
-    let voxels = (0..grid.voxels()).into_par_iter().map(voxel).collect();
+    let voxels = on_all_cores(|| (0..grid.voxels()).into_par_iter().map(voxel).collect());
     Image::new(grid, voxels)
 }
 
