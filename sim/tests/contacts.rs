@@ -123,6 +123,18 @@ fn cores_touch_as_whole_bodies() {
     assert_impulse(&segments[1][0], 1, Contact::BODY, Vec3::X * 1.0);
 }
 
+#[test]
+fn cores_have_a_stiffness_of_their_own() {
+    let response =
+        Penalty::new(100.0, 0.0, 0.0).and_then(|penalty| penalty.with_body_stiffness(300.0));
+    let detection = NodeSpheres { core_radius: 0.08 };
+    let stages = responding(POINTS, POINTS, detection, response.expect("two stiffnesses"));
+    let (segments, _) = interact(&stages, point_at(0, Vec3::ZERO), point_at(1, Vec3::X * 0.15));
+    // The cores are 0.01 m deep, the nodes 0.05 m.
+    assert_impulse(&segments[0][0], 0, Contact::BODY, Vec3::X * -3.0);
+    assert_impulse(&segments[0][1], 0, 0, Vec3::X * -5.0);
+}
+
 /// A rod of 2 kg and a point of 1 kg part by the depth of 10 mm within the frame of 1 s.
 #[test]
 fn cores_are_pushed_apart_by_an_implicit_spring_too() {
@@ -132,6 +144,18 @@ fn cores_are_pushed_apart_by_an_implicit_spring_too() {
     let impulse = Vec3::Y * (0.01 / (1.0 / 2.0 + 1.0));
     assert_impulse(&segments[0][0], 0, Contact::BODY, -impulse);
     assert_impulse(&segments[1][0], 1, Contact::BODY, impulse);
+}
+
+/// As fast as a body is as a whole, which is its nodes' mean, 4 of the 10 mm are gone without help.
+#[test]
+fn cores_that_part_already_are_pushed_less() {
+    let response = Compliant::contact(1e9, 0.0).expect("a stiffness");
+    let stages = responding(POINTS, POINTS, NodeSpheres { core_radius: 0.08 }, response);
+    let mut leaving = rod();
+    leaving.geometry.as_mesh_mut().expect("a mesh").set_velocity(Vec3::Y * -0.004);
+    let (segments, _) = interact(&stages, leaving, point_at(1, Vec3::Y * 0.15));
+    let impulse = Vec3::Y * (0.006 / (1.0 / 2.0 + 1.0));
+    assert_impulse(&segments[0][0], 0, Contact::BODY, -impulse);
 }
 
 #[test]

@@ -4,7 +4,7 @@ mod common;
 
 use std::any::Any;
 
-use common::{executors, particles, run, serial};
+use common::{executors, no_rules, particles, point, run, serial, springs};
 use dualframe_sim::behavior::MassSpring;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::{Executor, SerialExecutor, state_hash};
@@ -219,4 +219,20 @@ fn the_same_for_every_executor() {
             }
         }
     }
+}
+
+/// The damping of a pull is critical: the body comes to the target without going past it.
+#[test]
+fn a_pulled_body_does_not_swing() {
+    let mut executor = serial(Scene::new(vec![point(0, springs(0.0))], no_rules()));
+    let (target, stiffness) = ([0.1, 0.0, 0.0], 100.0);
+    post(&executor, Message::Pull { node: 0, target, stiffness });
+    let (mut farthest, mut last) = (0.0_f32, 0.0);
+    for _ in 0..480 {
+        run(&mut executor, 1);
+        last = look(&executor, |_, mesh| mesh.positions.get(0).expect("a node").x);
+        farthest = farthest.max(last);
+    }
+    assert!((last - 0.1).abs() < 1e-4, "{last} m after two seconds");
+    assert!(farthest < 0.100_1, "{farthest} m, which is too far");
 }

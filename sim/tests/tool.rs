@@ -138,6 +138,28 @@ fn a_perforator_that_was_released_has_to_engage_anew() {
 }
 
 #[test]
+fn a_perforator_that_is_taken_up_again_has_to_engage_anew() {
+    let (bone, workpieces) = bone();
+    let mut manager = manager(bone, OUTER + Vec3::Z * 0.005, workpieces);
+    let turns = |manager: &VeManager| {
+        read(manager, TOOL, |tool| Tool::of(tool).expect("a tool").work().turns)
+    };
+    take_up(&manager, Instrument::Perforator);
+    move_to(&manager, OUTER - Vec3::Z * 0.03, true);
+    run(&mut manager, 60);
+    assert!(turns(&manager), "it turns when it is pressed on bone");
+    // The button stays pressed.
+    take_up(&manager, Instrument::Scalpel);
+    move_to(&manager, OUTER + Vec3::Z * 0.02, true);
+    run(&mut manager, 120);
+    take_up(&manager, Instrument::Perforator);
+    for frame in 0..10 {
+        run(&mut manager, 1);
+        assert!(!turns(&manager), "it turns in the air, frame {frame}");
+    }
+}
+
+#[test]
 fn a_burr_drills_only_while_it_is_pressed() {
     let (bone, workpieces) = bone();
     let mut manager = manager(bone, OUTER + Vec3::Z * 0.005, workpieces);
@@ -173,10 +195,15 @@ fn a_switch_stops_the_bit() {
     run(&mut manager, 40);
     let before = removed(&manager);
     assert!(before > 0);
+    let felt = |manager: &VeManager| {
+        read(manager, TOOL, |tool| Tool::of(tool).expect("a tool").work().bone)
+    };
+    assert!(felt(&manager).length() > 1.0);
     take_up(&manager, Instrument::Craniotome);
     move_to(&manager, OUTER - Vec3::Z * 0.004, false);
-    // What was told before the switch is still done.
+    // What was told before the switch is still done, but not felt.
     run(&mut manager, 1);
+    assert_eq!(felt(&manager), Vec3::ZERO);
     let told = removed(&manager);
     run(&mut manager, 10);
     assert_eq!(removed(&manager), told);

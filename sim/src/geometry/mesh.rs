@@ -258,4 +258,43 @@ mod tests {
             assert!(mesh(mass, radius).is_ok(), "{mass} kg, {radius} m");
         }
     }
+
+    /// Two nodes, the first of which is held.
+    fn half_held(masses: [f32; 2], contact_radius: f32, topology: &Arc<Topology>) -> Mesh {
+        let places = [Vec3::ZERO, Vec3::X];
+        let mut mesh = Mesh::new(Arc::clone(topology), &places, &masses, contact_radius)
+            .expect("as many masses as nodes");
+        mesh.set_velocity(Vec3::X);
+        mesh
+    }
+
+    fn pair() -> Arc<Topology> {
+        let places = [Vec3::ZERO, Vec3::X];
+        Arc::new(Topology::new(&places, Vec::new(), &[], false).expect("two nodes"))
+    }
+
+    #[test]
+    fn what_is_held_goes_on_as_it_is_moved() {
+        let mut mesh = half_held([0.0, 1.0], 0.1, &pair());
+        mesh.damp(0.5);
+        assert_eq!(mesh.velocities, Vectors::from_slice(&[Vec3::X, Vec3::X * 0.5]));
+    }
+
+    #[test]
+    fn a_copy_is_the_whole_mesh() {
+        let topology = pair();
+        let from = half_held([0.0, 1.0], 0.1, &topology);
+        for other in [topology, pair()] {
+            let mut to = half_held([2.0, 3.0], 0.2, &other);
+            to.set_velocity(Vec3::ZERO);
+            to.copy_from(&from);
+            assert!(Arc::ptr_eq(to.topology(), from.topology()));
+            assert_eq!((to.masses(), to.contact_radius()), (from.masses(), 0.1));
+            assert_eq!(to.inverse_masses(), from.inverse_masses());
+            assert_eq!(
+                (to.positions, to.velocities),
+                (from.positions.clone(), from.velocities.clone())
+            );
+        }
+    }
 }

@@ -70,3 +70,21 @@ fn behind(point: Vec3, normal: Vec3) -> Bounds {
     }
     bounds
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wall_along_an_axis_is_a_bounded_half() {
+        let point = Vec3::new(1.0, 2.0, 3.0);
+        for axis in 0..3 {
+            let up = Rigid::wall(point, Vec3::AXES[axis]).bounds();
+            let down = Rigid::wall(point, -Vec3::AXES[axis]).bounds();
+            let (mut below, mut above) = (Bounds::ALL, Bounds::ALL);
+            (below.max[axis], above.min[axis]) = (point[axis], point[axis]);
+            assert_eq!((up, down), (below, above));
+        }
+        assert_eq!(Rigid::wall(point, Vec3::new(0.6, 0.8, 0.0)).bounds(), Bounds::ALL);
+    }
+}

@@ -135,6 +135,20 @@ mod tests {
         assert!((depth - SPACING).abs() < 0.1 * SPACING, "{depth}");
     }
 
+    /// Bone up to the end of its grid ends there, and reaches as far beyond as it does within a grid.
+    #[test]
+    fn a_grids_end_is_a_surface_like_any() {
+        let volume = Volume::from_fn([40, 40, 20], Vec3::splat(SPACING), Pose::IDENTITY, |_| 255);
+        let volume = Geometry::Volume(volume.expect("it is small"));
+        let full = Object::new(ObjectId(1), Group(1), volume, Fixed);
+        let (height, radius) = (0.2 * SPACING, 0.4 * SPACING);
+        let mut found = Touches::default();
+        NodesInBone.detect(&tissue(&[height], radius), &full, &mut found);
+        assert_eq!(found.list().len(), 1);
+        let off = found.list()[0].depth - (radius - height);
+        assert!(off.abs() < 0.1 * SPACING, "{off} m off");
+    }
+
     #[test]
     fn only_meshes_and_volumes() {
         let mut touches = Touches::default();

@@ -173,6 +173,18 @@ mod tests {
     }
 
     #[test]
+    fn a_bit_that_turns_the_other_way_is_dragged_the_other_way() {
+        let [forth, back] = [3e3, -3e3].map(|spin| {
+            let [mut on_tool, _] = respond(tool(Bit::BURR, Vec3::X, spin));
+            reaction(&mut on_tool)
+        });
+        assert_eq!(forth.elastic, back.elastic);
+        let drags = [forth, back].map(|felt| felt.force - felt.elastic);
+        assert!((drags[0] + drags[1]).length() < 1e-5, "{drags:?}");
+        assert!(drags[1].y > 0.1, "{drags:?}");
+    }
+
+    #[test]
     fn a_tip_alone_has_no_friction_and_bears_the_load() {
         let [mut on_tool, _] = respond(tool(Bit::PERFORATOR, Vec3::Z, 105.0));
         let felt = reaction(&mut on_tool);

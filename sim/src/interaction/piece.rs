@@ -213,6 +213,9 @@ mod tests {
     use parry3d::math::Pose;
 
     use super::*;
+    use crate::behavior::Fixed;
+    use crate::geometry::Geometry;
+    use crate::object::{Group, ObjectId};
 
     /// A plate of 60 mm and 20 g that slips while it stands on its edge is held, not kicked: along the bone a quarter
     /// of the mass answers that does from above.
@@ -230,6 +233,58 @@ mod tests {
         }
         let left = motion.at(edge.place);
         assert!(left.length() < 1e-6, "{left} m/s, {edge:?}");
+    }
+
+    /// Full bone below z = 5 mm, of voxels of 0.5 mm.
+    fn slab() -> Volume {
+        let full = |voxel: [u32; 3]| if voxel[2] < 10 { 255 } else { 0 };
+        let slab = Volume::from_fn([20; 3], Vec3::splat(5e-4), Pose::IDENTITY, full);
+        slab.expect("it is small")
+    }
+
+    #[test]
+    fn a_gap_is_the_way_to_the_surface_from_either_side() {
+        for (height, way) in [(2e-3, 4e-3), (4e-4, 1e-3), (-1e-4, 0.0), (-5e-5, 1e-3)] {
+            let place = Vec3::new(5e-3, 5e-3, 5e-3 + height);
+            let (gap, normal) = way_to(&slab(), place, Vec3::NEG_Z * way).expect("it is met");
+            assert!((gap - height).abs() < 5e-5, "{gap} m, not {height} m");
+            assert!(normal.distance(Vec3::Z) < 1e-3, "{normal}");
+        }
+        let above = Vec3::new(5e-3, 5e-3, 7e-3);
+        assert_eq!(way_to(&slab(), above, Vec3::NEG_Z * 1e-3), None, "not in this frame");
+    }
+
+    #[test]
+    fn a_point_may_come_as_near_as_it_is_and_comes_out_slowly() {
+        let (inverse_mass, inverse_inertia) = (1.0, Mat3::IDENTITY);
+        let (velocity, spin) = (Vec3::ZERO, Vec3::ZERO);
+        let motion = Motion { velocity, spin, inverse_mass, inverse_inertia };
+        // 1 mm away; what is let be; a fifth of 1 mm in a frame; and no more than so fast.
+        for (depth, least) in [(-1e-3, -0.06), (1e-5, 0.0), (1.02e-3, 0.012), (0.01, FASTEST_OUT)] {
+            let touch = Touch { nodes: [0, Contact::BODY], normal: [0.0, 0.0, 1.0], depth };
+            let point = Point::new(&touch, Vec3::ZERO, &motion, 1.0 / 60.0);
+            assert!((point.least - least).abs() < 1e-5, "{} m/s at {depth} m", point.least);
+        }
+    }
+
+    /// Points that a bit has taken away touch nothing any more.
+    #[test]
+    fn what_was_drilled_away_touches_nothing() {
+        let cube = Volume::from_fn([10; 3], Vec3::splat(5e-4), Pose::IDENTITY, |_| 255);
+        let mut cube = cube.expect("it is small");
+        cube.pose = Pose::from_translation(Vec3::new(2e-3, 2e-3, 4.6e-3));
+        let piece = Piece::new(&cube).loose();
+        let bone = Object::new(ObjectId(1), Group(1), Geometry::Volume(slab()), Fixed);
+        let count = |volume: Volume| {
+            let volume = Geometry::Volume(volume);
+            let first = Object::new(ObjectId(0), Group(0), volume, piece.clone());
+            let mut touches = Touches::default();
+            PieceInBone { time_step: 1.0 / 60.0 }.detect(&first, &bone, &mut touches);
+            touches.list().len()
+        };
+        assert!(count(cube.clone()) > 10);
+        cube.remove(cube.center(), 0.02, |voxel| voxel.share(1.0));
+        assert_eq!(count(cube), 0);
     }
 
     /// Voxel by voxel it would take minutes.

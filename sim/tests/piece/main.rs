@@ -17,7 +17,7 @@ use dualframe_sim::object::{Group, Object, ObjectId};
 use dualframe_sim::scene::Scene;
 use dualframe_sim::stages::Stages;
 use dualframe_sim::state::object_hash;
-use glam::{Quat, Vec3};
+use glam::{DMat3, DVec3, Quat, Vec3};
 use parry3d::math::Pose;
 
 const TIME: f32 = 1.0 / 60.0;
@@ -115,6 +115,36 @@ fn mass_and_inertia_of_a_plate() {
     assert!((100..=300).contains(&piece.samples().len()), "{}", piece.samples().len());
 }
 
+/// An angle without a plane of symmetry: its products of inertia are not zero.
+#[test]
+fn inertia_of_an_angle() {
+    let inside = |[x, y, z]: [u32; 3]| x < 4 || y < 3 && z < 5;
+    let dims = [12, 10, 8];
+    let pose = Pose::from_parts(Vec3::ONE, turned());
+    let full = |voxel: [u32; 3]| if inside(voxel) { 255 } else { 0 };
+    let volume = Volume::from_fn(dims, Vec3::splat(SPACING), pose, full).expect("it is small");
+    // The sum over the voxels, each a cube of its own.
+    let side = f64::from(SPACING);
+    let rows = (0..dims[2]).flat_map(|z| (0..dims[1]).map(move |y| [y, z]));
+    let voxels = rows.flat_map(|[y, z]| (0..dims[0]).map(move |x| [x, y, z]));
+    let middle = |[x, y, z]: [u32; 3]| (DVec3::new(x.into(), y.into(), z.into()) + 0.5) * side;
+    let places: Vec<DVec3> = voxels.filter(|&voxel| inside(voxel)).map(middle).collect();
+    let center = places.iter().sum::<DVec3>() / places.len() as f64;
+    let mass = BONE_DENSITY * side.powi(3);
+    let inertia: DMat3 = places.iter().fold(DMat3::ZERO, |sum, place| {
+        let way = *place - center;
+        let square = DVec3::splat(way.length_squared() + side * side / 6.0);
+        let outer = DMat3::from_cols(way * way.x, way * way.y, way * way.z);
+        sum + (DMat3::from_diagonal(square) - outer) * mass
+    });
+    for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+        let piece = Piece::new(&volume).loose().spinning(volume.turned(axis));
+        let spin = volume.turned_back(piece.body().angular_velocity(&volume));
+        let momentum = inertia * spin.as_dvec3();
+        assert!((momentum - axis.as_dvec3()).length() < 1e-3, "{momentum} for {axis}");
+    }
+}
+
 #[test]
 fn falls_freely() {
     let mut executor = scene(flap(Pose::from_translation(Vec3::Z)), true, vec![], 9.81);
@@ -145,6 +175,29 @@ fn keeps_its_momentum() {
     let length: f32 = pose.rotation.to_array().iter().map(|part| part * part).sum();
     assert!((length - 1.0).abs() < 1e-5);
     assert!(pose.rotation.angle_between(turned()) > 0.1, "it turned");
+}
+
+/// Who is in the way in the next frame is looked for in its box, and a corner of it may go far by turning alone.
+#[test]
+fn a_turning_piece_is_in_its_box_a_frame_later_too() {
+    let volume = flap(Pose::from_translation(Vec3::Z));
+    // 50 rad/s about the shortest side.
+    let piece = Piece::new(&volume).loose().spinning(Vec3::Z * 6e-6);
+    let object = Object::new(ObjectId(0), Group(0), Geometry::Volume(volume), piece);
+    let mut executor = serial(Scene::new(vec![object], stages(0.0)));
+    run(&mut executor, 1);
+    for frame in 1..8 {
+        let mut bounds = None;
+        executor.visit(&mut |object| bounds = Some(object.bounds()));
+        let bounds = bounds.expect("one piece");
+        run(&mut executor, 1);
+        let places: Vec<Vec3> = look(&executor, |piece, volume| {
+            piece.samples().iter().map(|&sample| volume.to_world(sample)).collect()
+        });
+        let is_inside =
+            |place: &&Vec3| place.cmpge(bounds.min).all() && place.cmple(bounds.max).all();
+        assert_eq!(places.iter().filter(is_inside).count(), places.len(), "frame {frame}");
+    }
 }
 
 #[test]
@@ -257,6 +310,63 @@ fn is_lifted_by_any_stiffness() {
         let off = (center(&executor) - start - Vec3::Z * 0.03).length();
         assert!(off < 1e-4, "{off} m off with {stiffness} N/m");
     }
+}
+
+/// A rotation and its negative are one, as after a whole turn; and what lies in its place does not turn on.
+#[test]
+fn a_piece_that_is_put_back_lies_still() {
+    let seat = Pose::from_parts(Vec3::Z * 0.1, turned());
+    let mut volume = flap(seat);
+    let piece = Piece::new(&volume).spinning(Vec3::Z * 2e-8);
+    volume.pose.rotation = -seat.rotation;
+    let object = Object::new(ObjectId(0), Group(0), Geometry::Volume(volume), piece);
+    let mut executor = serial(Scene::new(vec![object], stages(0.0)));
+    let start = center(&executor);
+    post(&executor, Grasp { by: TOOL, point: start, radius: 3e-3, stiffness: 1e3, strength: 20.0 });
+    post(&executor, Hold { by: TOOL, position: start + Vec3::Z * 5e-3 });
+    run(&mut executor, 1);
+    post(&executor, Hold { by: TOOL, position: start });
+    run(&mut executor, 3);
+    let momentum = look(&executor, |piece, _| piece.body().angular_momentum.length());
+    assert!(momentum > 1e-8, "it turns while it is held: {momentum} kg·m²/s");
+    assert!(look(&executor, |piece, _| !piece.is_seated()));
+    post(&executor, LetGo { by: TOOL });
+    run(&mut executor, 1);
+    look(&executor, |piece, volume| {
+        assert!(piece.is_seated());
+        assert_eq!(volume.pose, seat);
+        let motion = [piece.body().velocity, piece.body().angular_momentum, volume.velocity];
+        assert_eq!(motion, [Vec3::ZERO; 3]);
+    });
+}
+
+/// The spring of a hand is critically damped.
+#[test]
+fn what_a_hand_brings_somewhere_does_not_swing() {
+    let mut executor = scene(flap(Pose::from_translation(Vec3::Z)), true, vec![], 0.0);
+    let start = center(&executor);
+    post(&executor, Grasp { by: TOOL, point: start, radius: 3e-3, stiffness: 1.0, strength: 20.0 });
+    post(&executor, Hold { by: TOOL, position: start + Vec3::X * 0.02 });
+    let mut farthest = 0.0_f32;
+    for _ in 0..120 {
+        run(&mut executor, 1);
+        farthest = farthest.max(center(&executor).x - start.x);
+    }
+    let left = start.x + 0.02 - center(&executor).x;
+    assert!(left.abs() < 1e-4, "{left} m from its place after two seconds");
+    assert!(farthest < 0.02 + 1e-6, "{farthest} m, which is too far");
+}
+
+#[test]
+fn a_hand_pulls_with_its_strength_and_no_more() {
+    let mut executor = scene(flap(Pose::from_translation(Vec3::Z)), true, vec![], 0.0);
+    let (start, strength) = (center(&executor), 0.02);
+    post(&executor, Grasp { by: TOOL, point: start, radius: 3e-3, stiffness: 1e3, strength });
+    post(&executor, Hold { by: TOOL, position: start + Vec3::X * 10.0 });
+    run(&mut executor, 6);
+    let (mass, speed) = look(&executor, |piece, _| (piece.body().mass, piece.body().velocity.x));
+    let expected = strength * 6.0 * TIME / mass;
+    assert!((speed / expected - 1.0).abs() < 0.01, "{speed} m/s, not {expected}");
 }
 
 #[test]

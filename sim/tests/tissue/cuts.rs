@@ -1,7 +1,7 @@
 //! Tissue that is cut.
 
 use dualframe_sim::behavior::Grasp;
-use dualframe_sim::behavior::tissue::Cut;
+use dualframe_sim::behavior::tissue::{Cut, Material, Pin};
 use dualframe_sim::executor::Executor;
 use dualframe_sim::geometry::Mesh;
 use glam::Vec3;
@@ -82,4 +82,47 @@ fn no_spring_leads_across_a_full_cut() {
     run(&mut executor, 60);
     assert!(node(&executor, 80).y > 1.0, "the far half falls freely: {}", node(&executor, 80));
     assert!(node(&executor, 4).y < 0.2, "the near half is held");
+}
+
+/// What holds both ends of an edge holds a node that a cut makes on it, as firmly.
+#[test]
+fn new_nodes_are_held_as_those_they_come_from() {
+    let (mesh, tissue) = patch(9, scalp(), 12);
+    let places: Vec<Vec3> = mesh.positions.iter().collect();
+    let (stiffness, strength) = (2e3, 30.0);
+    let pins = (0..).zip(places).map(|(node, point)| Pin { node, point, stiffness, strength });
+    let tissue = tissue.with_pins(pins.collect()).expect("its own nodes");
+    let mut executor = alone(mesh, tissue, Vec3::ZERO);
+    let point = node(&executor, 40);
+    tell(&executor, Grasp { by: TOOL, point, radius: 0.012, stiffness, strength });
+    run(&mut executor, 1);
+    let held = look(&executor, |tissue, _| tissue.held_nodes(TOOL));
+    tell(&executor, Cut { by: TOOL, before: blade(-0.01, 0.0193), now: blade(0.06, 0.0214) });
+    run(&mut executor, 1);
+    look(&executor, |tissue, mesh| {
+        assert!(mesh.positions.len() > 81);
+        assert_eq!(tissue.pins().len(), mesh.positions.len());
+        for pin in tissue.pins() {
+            let off = (pin.point - tissue.rest()[pin.node as usize]).length();
+            assert!(off < 1e-6, "{pin:?} is {off} m off");
+            assert!((pin.stiffness / stiffness - 1.0).abs() < 1e-5, "{pin:?}");
+            assert!((pin.strength / strength - 1.0).abs() < 1e-5, "{pin:?}");
+        }
+        assert!(tissue.held_nodes(TOOL) > held, "{} nodes held", tissue.held_nodes(TOOL));
+    });
+}
+
+#[test]
+fn a_cut_does_not_stop_what_flies() {
+    let (mut mesh, tissue) = patch(9, Material { damping: 0.0, ..scalp() }, 12);
+    let velocity = Vec3::new(0.1, 0.2, 0.3);
+    mesh.set_velocity(velocity);
+    let mut executor = alone(mesh, tissue, Vec3::ZERO);
+    tell(&executor, Cut { by: TOOL, before: blade(-0.01, 0.0193), now: blade(0.06, 0.0214) });
+    run(&mut executor, 1);
+    look(&executor, |_, mesh| {
+        assert!(mesh.positions.len() > 81);
+        let off = mesh.velocities.iter().map(|own| (own - velocity).length()).fold(0.0, f32::max);
+        assert!(off < 1e-3, "{off} m/s");
+    });
 }

@@ -84,12 +84,13 @@ fn the_same_bits_for_every_executor_while_cuts_are_made() {
 
 #[test]
 fn a_hash_shows_everything_that_is_remembered() {
-    let hash = |told: Option<Box<dyn Custom>>| {
+    let hash_of = |told: Option<Message>| {
         let (mesh, tissue) = drum(7, 8);
         let mut executor = alone(mesh, tissue, Vec3::ZERO);
-        told.into_iter().for_each(|told| executor.mailbox().post(PATCH, Message::Custom(told)));
+        told.into_iter().for_each(|told| executor.mailbox().post(PATCH, told));
         run(&mut executor, 1).1
     };
+    let hash = |told: Option<Box<dyn Custom>>| hash_of(told.map(Message::Custom));
     // None of these moves a node within the frame.
     let far = Vec3::X;
     let (stiffness, strength) = (1.0, 1.0);
@@ -101,4 +102,6 @@ fn a_hash_shows_everything_that_is_remembered() {
     assert_eq!(plain, hash(None));
     let pinless = Scrape { center: lattice(7, EDGE).0[0] * 1.15, radius: 1e-6 };
     assert_ne!(hash(Some(Box::new(pinless))), plain);
+    // Without gravity it weighs nothing either way.
+    assert_ne!(hash_of(Some(Message::Weightless(true))), plain);
 }

@@ -110,6 +110,43 @@ fn the_engines_messages() {
     assert_eq!(look(&executor, |tissue, _| tissue.held_nodes(ObjectId::HOST)), 0);
 }
 
+/// Springs are fitted to the time of a substep: to another one anew, as to another stiffness.
+#[test]
+fn springs_act_as_the_time_step_is() {
+    let hash = |told: Option<Message>| {
+        let (mut mesh, tissue) = patch(5, scalp(), 8);
+        replace_positions(&mut mesh, |position, _| position * 1.1);
+        let mut executor = alone(mesh, tissue, Vec3::ZERO);
+        run(&mut executor, 3);
+        executor.change(&mut |stages| stages.time_step = 1.0 / 240.0);
+        told.into_iter().for_each(|told| executor.mailbox().post(PATCH, told));
+        run(&mut executor, 3).1
+    };
+    let same = Message::Stiffness { between_nodes: scalp().stiffness, to_center: 0.0 };
+    assert_eq!(hash(None), hash(Some(same)));
+}
+
+#[test]
+fn springs_of_another_stiffness_act_as_if_they_had_always_been_so() {
+    let pulled = |built: f32, told: Option<f32>| {
+        let (mesh, tissue) = patch(5, Material { stiffness: built, bending: 0.0, ..scalp() }, 8);
+        let mut executor = alone(mesh, tissue, Vec3::ZERO);
+        run(&mut executor, 2);
+        if let Some(between_nodes) = told {
+            let message = Message::Stiffness { between_nodes, to_center: 0.0 };
+            executor.mailbox().post(PATCH, message);
+        }
+        let target = (node(&executor, 12) + Vec3::Z * 0.01).to_array();
+        executor.mailbox().post(PATCH, Message::Pull { node: 12, target, stiffness: 100.0 });
+        run(&mut executor, 4);
+        node(&executor, 12)
+    };
+    let (soft, hard) = (pulled(0.1, None), pulled(4_330.0, None));
+    assert!((soft - hard).length() > 5e-5, "{soft} {hard}");
+    let softened = pulled(4_330.0, Some(0.1));
+    assert!((softened - soft).length() < 1e-6, "{softened}, not {soft}");
+}
+
 #[test]
 fn nonsense_is_refused() {
     let (rest, triangles) = lattice(3, EDGE);

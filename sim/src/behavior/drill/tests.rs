@@ -351,3 +351,33 @@ fn a_hand_that_cannot_be() {
     let error = Feed::new(1.0, 1.0, 1.0, f32::INFINITY).expect_err("an endless step");
     assert_eq!(error.what, "a step in contact");
 }
+
+/// What a bit with so much load (newtons) takes away in so many frames of 1 ms where there is bone all around it, in
+/// 255ths of a voxel.
+fn removed_within(bit: Bit, load: f32, frames: u64) -> f32 {
+    let (mut volume, mut erosions) = (block(255), Erosions::new());
+    let burr =
+        Burr { bit, center: Vec3::new(5e-3, 0.01, 8e-3), axis: Vec3::X, spin: 3e3, side: None };
+    for frame in 0..frames {
+        erosions.add(Erode { burr, load });
+        erosions.apply(&mut volume, frame, 1e-3);
+    }
+    erosions.removed() as f32
+}
+
+/// One hand presses all balls of a rod together: they do the work of one.
+#[test]
+fn the_balls_of_a_rod_share_its_load() {
+    let ball = removed_within(Bit { length: 0.0, ..Bit::CRANIOTOME }, 10.0, 20);
+    let rod = removed_within(Bit::CRANIOTOME, 10.0, 20);
+    assert!(ball > 500.0 && (rod / ball - 1.0).abs() < 0.1, "{rod} by a rod, {ball} by a ball");
+}
+
+/// Also near the axis, where a bit is slow, there is an end to the bone.
+#[test]
+fn a_load_beyond_measure_takes_all_there_is_in_reach() {
+    let bit = Bit::BURR;
+    let ball = 4.0 / 3.0 * std::f32::consts::PI * bit.radius.powi(3) / block(255).voxel_volume();
+    let share = removed_within(bit, 1e9, 1) / (255.0 * ball);
+    assert!((share - 1.0).abs() < 0.02, "{share}");
+}

@@ -358,3 +358,47 @@ proptest! {
         }
     }
 }
+
+/// A blade that rests where it is cuts nothing; its cut goes on from there as long as it is in the surface.
+#[test]
+fn a_blade_at_rest_that_is_taken_out_has_ended_its_cut() {
+    let mut surface = patch();
+    let front = cut(&mut surface, &[[10.0, 10.0], [20.0, 11.0]]);
+    let node = front.expect("it ends in the patch");
+    let whole = surface.clone();
+    let at = surface.nodes[node as usize].position;
+    let inside = blade([at.x * 1e3, at.y * 1e3]);
+    assert_eq!(surface.cut(Sweep { before: inside, now: inside }, front), front);
+    let up = |end: Vec3| end + Vec3::Z * 0.01;
+    let above = Blade { tip: up(inside.tip), heel: up(inside.heel) };
+    assert_eq!(surface.cut(Sweep { before: above, now: above }, front), None);
+    assert_eq!(surface, whole);
+}
+
+/// What lies in folds is cut where the blade enters, near its heel, and after that where the cut goes on.
+#[test]
+fn a_cut_begins_in_the_fold_next_to_the_heel() {
+    let corners = |z: f32| [[-1.0, -1.0, z], [2.0, -1.0, z], [-1.0, 2.0, z]].map(Vec3::from_array);
+    let node = |rest| CutNode { rest, position: rest, velocity: Vec3::ZERO };
+    let nodes = [0.0, 1.0, 2.0].into_iter().flat_map(corners).map(node).collect();
+    let triangles = vec![[0, 1, 2], [3, 4, 5], [6, 7, 8]];
+    let surface =
+        CutSurface { nodes, triangles, slits: Vec::new(), births: Vec::new(), shortest: 0.1 };
+    let blade = Blade { tip: Vec3::NEG_Z, heel: Vec3::Z * 3.0 };
+    let hit = |near: Option<Vec3>| {
+        surface.hit(&blade, near.map(|near| near.as_dvec3())).map(|hit| hit.triangle)
+    };
+    assert_eq!(hit(None), Some(2));
+    assert_eq!([0.2, 0.9, 1.7].map(|z| hit(Some(Vec3::Z * z))), [Some(0), Some(1), Some(2)]);
+}
+
+#[test]
+fn a_slit_that_gets_a_node_is_two() {
+    let mut surface = patch();
+    surface.slit([40, 41]);
+    let new = surface.node_on([41, 40], 0.5);
+    assert_eq!(surface.nodes.len(), NODES * NODES + 1);
+    let mut slits = surface.slits.clone();
+    slits.sort_unstable();
+    assert_eq!(slits, [[40, new], [41, new]]);
+}

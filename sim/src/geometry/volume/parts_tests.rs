@@ -49,7 +49,9 @@ fn a_closed_cut_frees_one_disc() {
     let expected = std::f32::consts::PI * 18.5 * 18.5;
     assert!((area / expected - 1.0).abs() < 0.02, "{area} voxels, {expected} expected");
     assert_eq!(disc.bounds()[2], 2..12);
+    volume.velocity = Vec3::X;
     let piece = volume.split_off(&disc).expect("its own part");
+    assert_eq!(piece.velocity, volume.velocity, "it moves on as it did");
     assert_eq!(mass(&volume) + mass(&piece), before, "nothing is lost or doubled");
     assert!(mass(&piece) as f32 > disc.voxels() as f32 * 240.0);
     // What is there is where it was, in the one or the other.
