@@ -96,6 +96,7 @@ fn write(hasher: &mut FnvHasher, value: u32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::message::Message;
     use crate::scene::ParticleScene;
 
     fn hash<'a>(objects: impl IntoIterator<Item = &'a Object>) -> u64 {
@@ -113,16 +114,28 @@ mod tests {
         let scene = || ParticleScene::new(2).build().expect("two particles are allowed").objects;
         let whole = hash(&scene());
         assert_eq!(hash(scene().iter().rev()), whole);
-        let changes: [fn(&mut Object); 4] = [
+        let changes: [fn(&mut Object); 7] = [
             |object| mesh(object).positions.set(41, Vec3::ZERO),
             |object| mesh(object).velocities.add(0, Vec3::Z),
-            |object| object.behavior.process(&crate::message::Message::Weightless(true)),
-            |object| object.process(&crate::message::Message::Remove, 3),
+            |object| object.behavior.process(&Message::Weightless(true)),
+            |object| object.behavior.process(&Message::Damping(0.5)),
+            |object| {
+                object.behavior.process(&Message::Pull {
+                    node: 0,
+                    target: [0.0; 3],
+                    stiffness: 1.0,
+                })
+            },
+            |object| object.process(&Message::Remove, 3),
+            |object| object.process(&Message::Remove, 4),
         ];
+        let mut seen = vec![whole];
         for (index, change) in changes.into_iter().enumerate() {
             let mut objects = scene();
             change(&mut objects[1]);
-            assert_ne!(hash(&objects), whole, "change {index}");
+            let changed = hash(&objects);
+            assert!(!seen.contains(&changed), "change {index}");
+            seen.push(changed);
         }
         assert_ne!(hash(&scene()[..1]), hash(&scene()[1..2]));
     }

@@ -104,6 +104,34 @@ fn goes_on_after_errors() {
     });
 }
 
+/// A device that tells where it is, and takes no force.
+struct Deaf;
+
+impl HapticDevice for Deaf {
+    fn description(&self) -> DeviceDescription {
+        SimulatedDevice::DESCRIPTION
+    }
+
+    fn read(&mut self, _time: f64) -> Result<DeviceSample, DeviceError> {
+        Ok(DeviceSample::at(Vec3::X))
+    }
+
+    fn write(&mut self, _wrench: Wrench) -> Result<(), DeviceError> {
+        Err(DeviceError::Timeout)
+    }
+}
+
+#[test]
+fn a_device_that_takes_no_force_is_told_of() {
+    let mut link = HapticLink::new();
+    let (end, mut simulation) = link.split();
+    let mut haptics = HapticLoop::new(Deaf, end, ForceSettings::default());
+    haptics.tick(0.0);
+    let tool = simulation.tool();
+    assert_eq!((tool.is_fresh, tool.sample.position), (true, Vec3::X));
+    assert_eq!((tool.fault, tool.ticks.failed), (Some(DeviceError::Timeout), 1));
+}
+
 /// A device that is pressed 5 mm deep into what the simulation tells, and whose driver panics as soon as a force is
 /// exerted. It keeps the last force.
 struct Panicking(Arc<AtomicU32>);

@@ -4,13 +4,16 @@ mod common;
 
 use std::sync::{Arc, Mutex};
 
-use common::{Acting, EXECUTORS, executor, executors, no_rules, particles, point, run, serial};
+use common::{
+    Acting, EXECUTORS, executor, executors, no_rules, particles, point, run, serial, springs,
+};
 use dualframe_sim::behavior::{Fixed, Input, Keyframe, Scripted};
 use dualframe_sim::blocking::Grain;
-use dualframe_sim::executor::Executor;
+use dualframe_sim::executor::{Entry, Executor, PipelineExecutor};
 use dualframe_sim::geometry::{Geometry, Rigid};
 use dualframe_sim::message::{Custom, Message};
 use dualframe_sim::object::{Drawing, Group, Object, ObjectId};
+use dualframe_sim::pool::Pool;
 use dualframe_sim::render::Renderer;
 use dualframe_sim::scene::Scene;
 use glam::{Quat, Vec3};
@@ -296,4 +299,34 @@ fn renderers_see_the_same_objects() {
         executor.advance(2, &mut seen, &mut |_| ()).expect("no table is full");
         assert_eq!(expected.get_or_insert_with(|| seen.clone()), &seen, "{name}");
     }
+}
+
+/// Letters find their objects also in the blocks that are formed for more threads.
+#[test]
+fn letters_arrive_when_threads_are_added() {
+    const OBJECTS: u32 = 100;
+    let scene = || {
+        let push = |_: &mut Geometry, input: &mut Input<'_>| {
+            for to in 1..OBJECTS {
+                let impulse = [1e-3 * to as f32, 0.0, 0.0];
+                input.post(ObjectId(to), Message::Impulse { node: 0, impulse });
+            }
+        };
+        let mut objects = vec![point(0, Acting(push))];
+        objects.extend((1..OBJECTS).map(|id| point(id, springs(0.0))));
+        for (place, object) in objects.iter_mut().enumerate() {
+            let mesh = object.geometry.as_mesh_mut().expect("a point is a mesh");
+            mesh.positions.set(0, Vec3::X * (place * 37 % OBJECTS as usize) as f32);
+            object.refit();
+        }
+        Scene::new(objects, no_rules())
+    };
+    let pool = Arc::new(Pool::new(1, false));
+    let pipeline =
+        PipelineExecutor::new(scene(), Grain::Spatial, Entry::default(), Arc::clone(&pool));
+    let mut grown = pipeline.expect("a valid scene");
+    run(&mut grown, 5);
+    pool.resize(4);
+    let (_, hash, _) = run(&mut grown, 5);
+    assert_eq!(hash, run(&mut serial(scene()), 10).1);
 }

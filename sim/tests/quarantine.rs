@@ -6,7 +6,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use common::{Acting, executors, hash_without, no_rules, particles, point, run, serial};
+use common::{Acting, executors, hash_without, no_rules, particles, point, run, serial, springs};
 use dualframe_sim::behavior::{Fixed, Input};
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::Executor;
@@ -114,6 +114,18 @@ fn an_infinity() {
     only_the_culprit_goes(worst, FaultKind::NonFinite);
 }
 
+/// Scenery that nothing changes is looked at all the same.
+#[test]
+fn scenery_that_was_nowhere_from_the_start() {
+    let nowhere = Pose::from_translation(Vec3::new(0.0, f32::NAN, 0.0));
+    let ball = Geometry::Rigid(Rigid::new(SharedShape::ball(0.1), nowhere));
+    let scenery = Object::new(ObjectId(0), Group(0), ball, Fixed);
+    let mut executor = serial(Scene::new(vec![scenery], no_rules()));
+    run(&mut executor, 1);
+    let kinds: Vec<FaultKind> = quarantined(&executor).iter().map(|entry| entry.1).collect();
+    assert_eq!(kinds, [FaultKind::NonFinite]);
+}
+
 #[test]
 fn told_to_leave() {
     let expected = hash_of_absence();
@@ -149,6 +161,20 @@ fn an_update_over_budget() {
     assert_eq!(kinds, [FaultKind::OverBudget]);
     assert_eq!(quarantined_with(Some(Duration::from_secs(3_600))), []);
     assert_eq!(quarantined_with(None), []);
+}
+
+/// Springs that could wait for those of others have a budget of their own as well.
+#[test]
+fn a_body_on_springs_over_budget() {
+    let quarantined_with = |budget| {
+        let mut stages = no_rules();
+        stages.callback_budget = Some(budget);
+        let mut executor = serial(Scene::new(vec![point(0, springs(1.0))], stages));
+        run(&mut executor, 1);
+        quarantined(&executor).len()
+    };
+    assert_eq!(quarantined_with(Duration::ZERO), 1, "it takes some time");
+    assert_eq!(quarantined_with(Duration::from_secs(3_600)), 0);
 }
 
 /// Panics for the pair of objects 0 and 1.

@@ -88,6 +88,7 @@ fn nearest(bone: &Volume, point: Vec3) -> Option<(f32, Vec3)> {
 
 #[cfg(test)]
 mod tests {
+    use glam::Quat;
     use parry3d::math::Pose;
 
     use super::*;
@@ -109,6 +110,21 @@ mod tests {
                 let tolerance = if height < -0.001 { 0.1 } else { 0.015 };
                 assert!(normal.distance(Vec3::Y) < tolerance, "{normal} at {height}");
             }
+        }
+    }
+
+    #[test]
+    fn a_turned_volume_is_felt_as_it_lies() {
+        let mut slab = slab();
+        let rotation = Quat::from_rotation_x(0.5) * Quat::from_rotation_z(0.3);
+        slab.pose = Pose::from_parts(Vec3::new(0.3, -0.2, 0.1), rotation);
+        let up = slab.turned(Vec3::Y);
+        // Felt by a ball, and met by a ray.
+        for height in [0.000_4, 0.010] {
+            let place = slab.to_world(Vec3::new(0.02, 0.01 + height, 0.02));
+            let (distance, normal) = slab.distance(place);
+            assert!((distance - height).abs() < 5e-4, "{distance} at {height}");
+            assert!(normal.distance(up) < 0.05, "{normal}, not {up} at {height}");
         }
     }
 

@@ -135,6 +135,18 @@ mod tests {
         assert_eq!(forces.least_absorbed, 0.0);
     }
 
+    /// A loop of 2.5 Hz has no tick at a second's end: a mean is over 1.2 s.
+    #[test]
+    fn power_is_over_the_time_that_passed() {
+        let (mut forces, mut passivity) = (Forces::default(), Passivity::new(0.0, 0.0));
+        for tick in 1..=12 {
+            passivity.observe(Vec3::Y, -Vec3::Y * 0.02);
+            forces.energy(f64::from(tick) * 0.4, &passivity);
+            let expected = if tick < 3 { 0.0 } else { 0.05 };
+            assert!((forces.power - expected).abs() < 1e-6, "{} W, tick {tick}", forces.power);
+        }
+    }
+
     #[test]
     fn errors() {
         let mut forces = Forces::default();

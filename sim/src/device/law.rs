@@ -415,4 +415,20 @@ mod tests {
         assert!(torques.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 0.020_01), "{torques:?}");
         assert!((torques[198] - 0.1).abs() < 1e-6, "{}", torques[198]);
     }
+
+    #[test]
+    fn an_error_is_of_what_replaces_another_model() {
+        let mut law = law();
+        let pressed = LocalModel { force: Vec3::Y * 2.0, position: Vec3::Y * -2e-3, ..WALL };
+        let inside = DeviceSample::at(pressed.position);
+        for tick in 0..5 {
+            law.step(tick as f64 * PERIOD, &inside, (1 + tick / 2, &pressed));
+        }
+        let Forces { models, greatest_error, .. } = *law.forces();
+        assert_eq!((models, greatest_error), (3, 0.0), "the first one replaces nothing");
+        let softer = LocalModel { force: Vec3::Y, ..pressed };
+        law.step(5.0 * PERIOD, &inside, (4, &softer));
+        let Forces { models, interpolation_error, .. } = *law.forces();
+        assert_eq!((models, interpolation_error), (4, 1.0));
+    }
 }

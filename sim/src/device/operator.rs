@@ -172,4 +172,18 @@ mod tests {
         let place = device.read(2.0).expect("always there").position;
         assert!(place.abs_diff_eq(Vec3::Y * 0.01, 2e-5), "{place}");
     }
+
+    #[test]
+    fn what_has_passed_does_not_pass_again() {
+        let read = |times: &[f64]| {
+            let motion = Motion::at_rest(Vec3::ZERO).expect("finite");
+            let mut device = SimulatedDevice::new(Hand::FIRM, motion);
+            let force = Wrench { force: Vec3::Y * 5.0, torque: Vec3::ZERO };
+            device.write(force).expect("always there");
+            let places =
+                times.iter().map(|&time| device.read(time).expect("always there").position);
+            places.last()
+        };
+        assert_eq!(read(&[0.02, 0.01, 0.02]), read(&[0.02]));
+    }
 }

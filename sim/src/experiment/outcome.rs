@@ -187,8 +187,74 @@ fn in_words(all: usize, left_out: usize, shown: usize) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+    use crate::experiment::calibrator::Phase;
+    use crate::experiment::error::ExperimentError;
+    use crate::experiment::load::RenderLoad;
+    use crate::experiment::subject::Subject;
+    use crate::experiment::timing::Contender;
+    use crate::scene::ParticleScene;
+
+    /// The outcome of a race of so many frames in which each runner takes these seconds in every round, in these
+    /// phases before and after each.
+    pub(in super::super) fn outcome(
+        frames: u64,
+        seconds: &[(Runner, f64)],
+        gains: &[f64],
+    ) -> Outcome {
+        let subject = Subject::Particles(ParticleScene::new(4));
+        let rounds = gains.len() - 1..=gains.len() - 1;
+        let (load, warm_up) = (RenderLoad::Null, 0);
+        let contender = |&(runner, seconds): &(Runner, f64)| Contender {
+            label: runner.label(),
+            spins: false,
+            run: Box::new(move || Ok::<_, ExperimentError>(seconds)),
+        };
+        let mut contenders: Vec<_> = seconds.iter().map(contender).collect();
+        let mut gains = gains.iter();
+        let mut phase = || Phase { gain: *gains.next().expect("a phase"), ping_pong: 100.0 };
+        let series = Series::measure(&mut contenders, rounds.clone(), &mut phase, &mut || ());
+        Outcome {
+            race: Race { subject, load, warm_up, frames, rounds },
+            runners: seconds.iter().map(|&(runner, _)| runner).collect(),
+            series: series.expect("nothing fails"),
+        }
+    }
+
+    #[test]
+    fn speed_ups_are_of_the_faster_over_the_slower() {
+        let [one, two] = [1, 2].map(Runner::pipeline);
+        let seconds = [(Runner::SERIAL, 6.0), (one, 4.0), (two, 2.5)];
+        let outcome = outcome(100, &seconds, &[2.0; 4]);
+        let median = |quartiles: Option<Quartiles>| quartiles.map(|quartiles| quartiles.median);
+        assert_eq!(median(outcome.speed_up(Rounds::Good, two, one)), Some(1.6));
+        assert_eq!(outcome.median_speed_up(two, Runner::SERIAL), Some(2.4));
+        assert_eq!(outcome.median_speed_up(Runner::pipeline(3), one), None);
+        assert_eq!(median(outcome.throughput(Rounds::All, two)), Some(40.0));
+        let mut table = Outcome::rounds_table("rounds");
+        outcome.add_rounds(&mut table);
+        let third = ["4", "null", "pipeline", "2", "0", "2.500000", "40.00", "2.000", "100.0", "0"];
+        assert_eq!(table.rows[2], third);
+        let mut table = Outcome::summary_table("summary");
+        outcome.add_summary(&mut table);
+        let row = &table.rows[2];
+        assert_eq!(
+            row[..10],
+            ["4", "null", "pipeline", "2", "all", "3", "2.500000", "2.500000", "2.500000", "40.00"]
+        );
+        let ratios = ["2.4000", "2.4000", "2.4000", "1.6000", "1.6000", "1.6000", "0.8000"];
+        assert_eq!(row[10..], ratios, "S_s, S_p and E_p");
+    }
+
+    #[test]
+    fn marked_rounds_are_counted_as_they_are_shown() {
+        let seconds = [(Runner::SERIAL, 1.0)];
+        let some = outcome(1, &seconds, &[2.0, 2.0, 1.0]);
+        let all = outcome(1, &seconds, &[1.0, 1.0]);
+        assert_eq!(marked([&some]), in_words(2, 1, 0));
+        assert_eq!(marked([&some, &all]), in_words(3, 1, 1));
+    }
 
     #[test]
     fn what_is_left_out_is_said() {

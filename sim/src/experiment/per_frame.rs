@@ -147,3 +147,34 @@ impl Frames {
         .lines(lines.collect())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::outcome::tests::outcome;
+
+    #[test]
+    fn a_frames_speed_up_is_the_median_over_good_rounds() {
+        let seconds = [1, 2].map(|threads| (Runner::pipeline(threads), 1.0));
+        // Two rounds of two frames, the last one marked.
+        let outcome = outcome(2, &seconds, &[2.0, 2.0, 1.0]);
+        let (one, two) = ([4.0, 6.0, 9.0, 9.0], [2.0, 2.0, 1.0, 1.0]);
+        let speed_up = by_frame(&outcome, &one, &two);
+        assert_eq!(speed_up, [2.0, 3.0]);
+        let speed_ups = vec![(1, by_frame(&outcome, &one, &one)), (2, speed_up)];
+        let frames = Frames { outcome, collisions: vec![7, 5], speed_ups };
+        assert_eq!(
+            frames.table().rows,
+            [["0", "7", "1.0000", "2.0000"], ["1", "5", "1.0000", "3.0000"]]
+        );
+        let summary = frames.summary();
+        assert_eq!(summary.rows[1], ["2", "2.25000", "2.50000", "2.75000", "3.00000", "0.25000"]);
+    }
+
+    #[test]
+    fn where_all_rounds_are_marked_all_count() {
+        let seconds = [1, 2].map(|threads| (Runner::pipeline(threads), 1.0));
+        let outcome = outcome(1, &seconds, &[1.0; 3]);
+        assert_eq!(by_frame(&outcome, &[4.0, 6.0], &[2.0, 2.0]), [2.5]);
+    }
+}

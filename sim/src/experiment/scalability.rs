@@ -161,3 +161,26 @@ pub(super) fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
         (least.min(value), greatest.max(value))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::outcome::tests::outcome;
+
+    #[test]
+    fn findings_say_what_was_reached() {
+        let seconds = [Runner::SERIAL, Runner::pipeline(1), Runner::pipeline(2)].into_iter();
+        let seconds: Vec<_> = seconds.zip([6.0, 4.0, 2.5]).collect();
+        let outcomes = [outcome(100, &seconds, &[2.0; 4])];
+        let none = "None of the 3 rounds was marked.";
+        let finding =
+            |figure: Result<Figure, ExperimentError>| figure.expect("it is drawn").finding;
+        let reached = "40 frames per second with 4 objects";
+        let expected = format!("2 threads: {reached}, {reached}. {none}");
+        assert_eq!(finding(throughput(&outcomes, &[1, 2])), expected);
+        let expected = format!("With 2 threads the speed-up is 1.60 to 1.60. {none}");
+        assert_eq!(finding(speed_ups(&outcomes, &[1, 2])), expected);
+        let expected = format!("The efficiency is at least 0.800. {none}");
+        assert_eq!(finding(efficiencies(&outcomes, &[1, 2])), expected);
+    }
+}

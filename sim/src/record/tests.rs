@@ -298,6 +298,21 @@ fn lengths_that_no_chunk_has() {
     }
 }
 
+/// No packed byte holds more than so many; what a chunk says beyond that need not be unpacked to be wrong.
+#[test]
+fn a_packed_chunk_is_no_longer_than_packing_allows() {
+    let file = session();
+    let first = chunk::START;
+    for (length, is_too_long) in [(10 * 1032_u32, false), (10 * 1032 + 1, true)] {
+        let mut file = file.clone();
+        file[first + 1] = 1;
+        file[first + 2..first + 6].copy_from_slice(&10_u32.to_le_bytes());
+        file[first + 6..first + 10].copy_from_slice(&length.to_le_bytes());
+        let error = Reader::new(&file[..]).err().expect("it is another length");
+        assert_eq!(matches!(error.flaw, Flaw::Length { .. }), is_too_long, "{error}");
+    }
+}
+
 #[test]
 fn totals_come_back() {
     let totals =

@@ -256,7 +256,7 @@ mod tests {
     use dualframe_core::error::Table;
 
     use super::*;
-    use crate::executor::state_hash;
+    use crate::executor::{SerialExecutor, state_hash};
     use crate::render::NullRenderer;
     use crate::scene::ParticleScene;
 
@@ -322,5 +322,28 @@ mod tests {
         let before = executor.layout.tables.contact_capacity();
         advance(&mut executor, 1);
         assert_eq!(executor.layout.tables.contact_capacity(), 2 * before);
+    }
+
+    /// Contacts for which there is no room are handed over all the same.
+    #[test]
+    fn what_does_not_fit_is_not_lost() {
+        let scene = || {
+            let mut scene = ParticleScene::new(60).build().expect("a valid scene");
+            let mesh = |object: &mut Object| object.geometry.as_mesh_mut().cloned();
+            let first = mesh(&mut scene.objects[0]).expect("a particle").positions;
+            for object in scene.objects.iter_mut().take(24) {
+                object.geometry.as_mesh_mut().expect("a particle").positions = first.clone();
+                object.refit();
+            }
+            scene
+        };
+        let mut serial = SerialExecutor::new(scene(), Grain::Spatial).expect("a valid scene");
+        let advanced = serial.advance(3, &mut NullRenderer::new(), &mut |_| ());
+        advanced.expect("nothing can be full");
+        for threads in [1, 2] {
+            let mut executor = executor(scene(), threads);
+            advance(&mut executor, 3);
+            assert_eq!(state_hash(&executor), state_hash(&serial), "{threads} threads");
+        }
     }
 }

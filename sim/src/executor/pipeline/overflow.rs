@@ -76,3 +76,32 @@ impl Overflow {
         self.late.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::message::Message;
+    use crate::object::ObjectId;
+
+    #[test]
+    fn letters_are_delivered_when_they_are_due_and_once() {
+        let overflow = Overflow::default();
+        for (sequence, due) in [(0, 5), (1, 6), (2, 5)] {
+            let parcel = Parcel { to: ObjectId(7), message: Message::Release };
+            overflow.keep(due, UnitId(1), From { sender: 3, sequence }, parcel);
+        }
+        let delivered = |to: u32, frame: u64| {
+            let mut letters = Vec::new();
+            overflow.deliver(UnitId(to), frame, |(from, _)| letters.push(from.sequence));
+            letters
+        };
+        assert_eq!(delivered(1, 4), []);
+        assert_eq!(delivered(2, 5), [], "to another unit");
+        assert_eq!(delivered(1, 5), [0, 2]);
+        assert_eq!(delivered(1, 5), []);
+        let mut left = Vec::new();
+        overflow.empty(|(from, _)| left.push(from.sequence));
+        assert_eq!((left, overflow.most()), (vec![1], 3));
+        assert_eq!(delivered(1, 6), []);
+    }
+}

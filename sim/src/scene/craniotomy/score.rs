@@ -203,6 +203,17 @@ mod tests {
 
     use super::*;
 
+    /// What is told is the upper end of the step that the force is in.
+    #[test]
+    fn one_frame_in_twenty_may_be_harder() {
+        for (soft, hard, expected) in [(95, 5, 1.0), (94, 6, 10.0), (0, 1, 10.0), (0, 0, 0.0)] {
+            let mut score = Score::new(0.01);
+            // From 0.75 N on, and from 9.75 N on.
+            (score.forces[3], score.forces[39]) = (soft, hard);
+            assert_eq!(score.percentile(0.95), expected, "{soft}, {hard}");
+        }
+    }
+
     #[test]
     fn a_hole_along_the_outer_table() {
         let planned = Entry { point: Vec3::ZERO, inward: Vec3::NEG_Y, thickness: 0.005 };
