@@ -288,3 +288,19 @@ impl Totals {
         Ok(totals)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Also where the frames that have passed, and not a letter, say that another frame's come.
+    #[test]
+    fn letters_are_counted_frame_by_frame() {
+        let mut order = Order::default();
+        let fill = |order: &mut Order, due| (0..MAX_LETTERS).try_for_each(|_| order.letter(due));
+        assert_eq!(fill(&mut order, 1), Ok(()));
+        assert_eq!(order.close(2), Ok(()));
+        assert_eq!(fill(&mut order, 2), Ok(()));
+        assert_eq!(order.letter(2), Err(Disorder::Letters { due: 2 }));
+    }
+}
