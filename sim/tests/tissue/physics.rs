@@ -1,8 +1,10 @@
 //! How tissue moves by itself.
 
+use std::sync::Arc;
+
 use dualframe_sim::behavior::tissue::{Material, Pin, Tissue};
 use dualframe_sim::executor::Executor;
-use dualframe_sim::geometry::{Mesh, icosphere};
+use dualframe_sim::geometry::{Mesh, Topology, edges, icosphere};
 use dualframe_sim::message::Message;
 use glam::Vec3;
 
@@ -81,6 +83,26 @@ fn a_solid_body_whose_nodes_differ_in_mass_comes_to_rest() {
             look(&executor, |_, mesh| mesh.velocities.iter().map(Vec3::length).fold(0.0, f32::max));
         assert!(fastest < 1e-3, "{fastest} m/s at {stiffness} N/m");
     }
+}
+
+/// Tissue is held by pins; a mesh that somebody has put in its place may have such a node all the same.
+#[test]
+fn a_node_without_mass_is_no_end_of_a_solid_body() {
+    let (rest, triangles) = icosphere(0.05);
+    let material = Material { stiffness: 500.0, bending: 0.0, to_center: 500.0, ..scalp() };
+    let (mesh, tissue) = Tissue::new(&rest, triangles.clone(), material, 1e-3, 16).expect("a ball");
+    let mut masses = mesh.masses().to_vec();
+    masses[0] = 0.0;
+    let edges = edges(&triangles);
+    let topology = Arc::new(Topology::new(&rest, triangles, &edges, true).expect("a ball"));
+    let other = Mesh::new(topology, &rest, &masses, 1e-3).expect("as many masses as nodes");
+    let mut executor = alone(other, tissue, Vec3::NEG_Y * GRAVITY);
+    run(&mut executor, 60);
+    let far = look(&executor, |_, mesh| {
+        let first = mesh.positions.get(0).expect("a node");
+        mesh.positions.iter().map(|place| place.distance(first)).fold(0.0, f32::max)
+    });
+    assert!((0.09..0.11).contains(&far), "{far} m: it falls as a whole");
 }
 
 #[test]

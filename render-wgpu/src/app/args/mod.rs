@@ -233,7 +233,7 @@ pub(in crate::app) struct Products {
     #[arg(long, value_name = "DIR")]
     pub(in crate::app) frames_out: Option<PathBuf>,
     /// Width and height of window and pictures, in pixels
-    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size, allow_hyphen_values = true)]
     pub(in crate::app) size: (u32, u32),
     /// A part of the graphics adapter's name
     #[arg(long, value_name = "NAME")]

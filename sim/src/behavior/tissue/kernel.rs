@@ -58,7 +58,7 @@ impl Nodes {
 /// The springs to the centre of a solid body.
 #[derive(Clone, Copy)]
 pub(super) struct ToCenter<'a> {
-    /// The nodes' distances to the mean of all nodes at rest, in metres.
+    /// The nodes' distances to the centre of mass at rest, in metres.
     pub(super) rest: &'a [f32],
     /// 1/(k h²) of each, in 1/kg.
     pub(super) compliance: f32,
@@ -152,7 +152,8 @@ impl ToCenter<'_> {
         let positions = &mut positions[..self.rest.len()];
         let (mut center, mut whole) = ([0.0; 4], 0.0);
         for position in &*positions {
-            let mass = 1.0 / position[3];
+            // What is held, in a mesh that somebody has put in the place of the tissue's own, has no part in it.
+            let mass = if position[3] > 0.0 { 1.0 / position[3] } else { 0.0 };
             whole += mass;
             for axis in 0..4 {
                 center[axis] += position[axis] * mass;
@@ -170,8 +171,10 @@ impl ToCenter<'_> {
         for (position, &rest) in positions.iter_mut().zip(self.rest) {
             let pull = self.pull(position, rest, &center);
             let inverse_mass = position[3];
-            for axis in 0..4 {
-                position[axis] += pull[axis] * inverse_mass - back[axis];
+            if inverse_mass > 0.0 {
+                for axis in 0..4 {
+                    position[axis] += pull[axis] * inverse_mass - back[axis];
+                }
             }
         }
     }

@@ -21,7 +21,7 @@ pub struct Material {
     /// k of the springs that resist bending, which join the far corners of two triangles with a common
     /// edge, in newtons per metre; usually 0.01 to 0.1 of `stiffness`, 0 for none.
     pub bending: f32,
-    /// k of the springs to the centre that keep a solid body's shape, in newtons per metre; usually
+    /// k of the springs to the centre of mass that keep a solid body's shape, in newtons per metre; usually
     /// 0 for a sheet, and `stiffness` for a solid body.
     pub to_center: f32,
     /// The rate at which velocities decay, per second: a substep of h seconds divides them by
