@@ -81,10 +81,11 @@ fn without_memory_for_threads() {
 #[test]
 fn threads_that_cannot_be_had() {
     let test = std::env::current_exe().expect("this one");
-    // Half of what 256 threads' stacks of 2 MiB take.
-    let script = "ulimit -v 262144; exec \"$0\" --ignored --exact without_memory_for_threads";
+    // Some twenty threads' stacks of 1 GiB, and about half of one, in KiB: so that there is memory for all else.
+    let script = "ulimit -v 21495808; exec \"$0\" --ignored --exact without_memory_for_threads";
     let child = std::process::Command::new("sh")
         .args(["-c".as_ref(), script.as_ref(), test.as_os_str()])
+        .envs([("RUST_MIN_STACK", "1073741824"), ("MALLOC_ARENA_MAX", "1")])
         .output()
         .expect("there is a shell");
     let said = String::from_utf8_lossy(&child.stdout);
