@@ -64,9 +64,10 @@ fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
     let names: String =
         others.iter().map(|other| format!("  {:>16}", other.executor.name())).collect();
     println!(
-        "\n{}: medians over good rounds (all if none is good); ceiling: what two independent environments gain, \
+        "\n{}: medians over good rounds (all if none is good); ceiling: what {} independent environments gain, \
          the median of {GAIN_ROUNDS} measurements after the race, disturbed ones too",
-        pipeline.label()
+        pipeline.label(),
+        arguments.threads
     );
     println!("objects  render    ceiling    S_s    E_p  fastest{names}");
     lines.iter().for_each(|line| println!("{line}"));

@@ -51,10 +51,13 @@ const SINGLE_OBJECTS: usize = 64;
 /// Blocks for each object to the power of 2/3; usually 0.1. The tests between blocks grow as the square of their
 /// number, those within blocks as the square of the objects of each: with that power both stay in balance.
 const BLOCKS: f64 = 0.1;
-/// The most blocks for each worker, if each has [`FILLING`] objects: so that whoever is done can help out another.
-/// Usually 4. With fewer objects there are fewer, one at least: fuller lanes are worth more, and interactions are
-/// there to help out with.
-const MOST_PER_WORKER: usize = 4;
+/// The fewest blocks for each worker, so that whoever is done can help out another, if each has [`FULL`] objects: with
+/// emptier lanes more is lost than that gains, and one for each worker is better.
+const FEWEST_PER_WORKER: usize = 2;
+/// So many share out better still, if each has [`FILLING`] objects.
+const USUAL_PER_WORKER: usize = 4;
+/// Objects of a block whose lanes are full for most substeps; usually 45.
+const FULL: usize = 45;
 /// Objects of a block that leave few of its lanes empty, however uneven they are; usually 70, a few more than twice as
 /// many as are advanced side by side.
 const FILLING: usize = 70;
@@ -264,7 +267,8 @@ fn block_count(objects: usize, workers: usize) -> usize {
     }
     let workers = workers.max(1);
     let fewest_tests = (BLOCKS * (objects as f64).cbrt().powi(2)).round() as usize;
-    let shared_out = (objects / FILLING).clamp(workers, MOST_PER_WORKER * workers);
+    let [fewest, usual] = [FEWEST_PER_WORKER, USUAL_PER_WORKER].map(|blocks| blocks * workers);
+    let shared_out = (objects / FILLING).clamp((objects / FULL).clamp(workers, fewest), usual);
     // No worker is to have one more than another; rather fewer and fuller ones.
     let wanted = (fewest_tests.max(shared_out) + (workers - 1) / 2) / workers * workers;
     wanted.min(objects.div_ceil(HALF))
