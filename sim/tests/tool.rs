@@ -24,16 +24,20 @@ const OTHER: ObjectId = ObjectId(1);
 
 /// A tool at a place, upright, and another object that it can work on.
 fn manager(other: Object, at: Vec3, workpieces: Workpieces) -> VeManager {
+    manager_of(vec![other], at, workpieces)
+}
+
+/// The same with several others.
+fn manager_of(mut objects: Vec<Object>, at: Vec3, workpieces: Workpieces) -> VeManager {
     let (rigid, tool) = Tool::new(Instrument::Forceps, DeviceSample::at(at), workpieces);
-    let tool = Object::new(TOOL, Group(0), Geometry::Rigid(rigid), tool);
+    objects.push(Object::new(TOOL, Group(0), Geometry::Rigid(rigid), tool));
     let mut rules = Rules::new();
     let pair = InteractionPair { detection: Box::new(BurrInBone), response: Box::new(BurrForce) };
     rules.model(Group(0), Group(1), pair).expect("the groups exist");
     let (gravity, simd) = (Vec3::ZERO, Simd::detect());
     let stages = Stages { rules, time_step: TIME_STEP, gravity, callback_budget: None, simd };
     let settings = Settings { executor: ExecutorKind::Serial, threads: 1, ..Settings::default() };
-    let scene = Scene::new(vec![tool, other], stages);
-    VeManager::new(scene, settings).expect("two objects can be run")
+    VeManager::new(Scene::new(objects, stages), settings).expect("they are numbered")
 }
 
 fn run(manager: &mut VeManager, frames: u64) {
@@ -69,9 +73,20 @@ const OUTER: Vec3 = Vec3::new(0.032, 0.032, 0.044);
 const THICKNESS: f32 = 0.007;
 
 fn bone() -> (Object, Workpieces) {
+    (bone_of(OTHER), Workpieces { bone: vec![OTHER], ..Workpieces::default() })
+}
+
+fn bone_of(id: ObjectId) -> Object {
     let volume = bone_piece(128, Pose::IDENTITY).expect("128 voxels are allowed");
-    let bone = Object::new(OTHER, Group(1), Geometry::Volume(volume), Bone::new());
-    (bone, Workpieces { bone: vec![OTHER], ..Workpieces::default() })
+    Object::new(id, Group(1), Geometry::Volume(volume), Bone::new())
+}
+
+/// What has been drilled away of a bone.
+fn removed(manager: &VeManager, id: ObjectId) -> u64 {
+    read(manager, id, |bone| {
+        let behavior: &dyn std::any::Any = &*bone.behavior;
+        behavior.downcast_ref::<Bone>().expect("bone").removed()
+    })
 }
 
 #[test]
@@ -98,17 +113,11 @@ fn a_perforator_stops_at_the_inner_table() {
         "it is {past} m past the inner table after {seconds} s"
     );
     // It stays there, and lets nothing be taken away.
-    let removed = |manager: &VeManager| {
-        read(manager, OTHER, |bone| {
-            let behavior: &dyn std::any::Any = &*bone.behavior;
-            behavior.downcast_ref::<Bone>().expect("bone").removed()
-        })
-    };
-    let before = removed(&manager);
+    let before = removed(&manager, OTHER);
     run(&mut manager, 120);
     let later = OUTER.z - THICKNESS - tip(&manager).z;
     assert!(later < 0.001, "it is {later} m past the inner table after two seconds more");
-    assert!(removed(&manager) - before < 255 * 8, "it went on drilling");
+    assert!(removed(&manager, OTHER) - before < 255 * 8, "it went on drilling");
     // Without the button nothing turns, in bone or in air.
     move_to(&manager, OUTER + Vec3::Z * 0.02, false);
     run(&mut manager, 120);
@@ -179,21 +188,31 @@ fn a_burr_drills_only_while_it_is_pressed() {
     assert!(OUTER.z - tip(&manager).z > 0.003);
 }
 
+#[test]
+fn two_bones_under_one_bit_share_what_it_presses() {
+    let drilled = |bones: &[ObjectId]| -> u64 {
+        let workpieces = Workpieces { bone: bones.to_vec(), ..Workpieces::default() };
+        let objects = bones.iter().copied().map(bone_of).collect();
+        let mut manager = manager_of(objects, OUTER + Vec3::Z * 0.005, workpieces);
+        take_up(&manager, Instrument::Burr);
+        move_to(&manager, OUTER - Vec3::Z * 0.004, true);
+        run(&mut manager, 60);
+        bones.iter().map(|&bone| removed(&manager, bone)).sum()
+    };
+    let (alone, both) = (drilled(&[OTHER]), drilled(&[OTHER, ObjectId(2)]));
+    // Twice as much if the hand pressed as hard on each of them.
+    assert!(alone > 0 && both.abs_diff(alone) < alone / 4, "{both}, and {alone} of one");
+}
+
 /// A bit that turned does not turn on, or drill, as another instrument that is not pressed.
 #[test]
 fn a_switch_stops_the_bit() {
     let (bone, workpieces) = bone();
     let mut manager = manager(bone, OUTER + Vec3::Z * 0.005, workpieces);
-    let removed = |manager: &VeManager| {
-        read(manager, OTHER, |bone| {
-            let behavior: &dyn std::any::Any = &*bone.behavior;
-            behavior.downcast_ref::<Bone>().expect("bone").removed()
-        })
-    };
     take_up(&manager, Instrument::Burr);
     move_to(&manager, OUTER - Vec3::Z * 0.004, true);
     run(&mut manager, 40);
-    let before = removed(&manager);
+    let before = removed(&manager, OTHER);
     assert!(before > 0);
     let felt = |manager: &VeManager| {
         read(manager, TOOL, |tool| Tool::of(tool).expect("a tool").work().bone)
@@ -204,9 +223,9 @@ fn a_switch_stops_the_bit() {
     // What was told before the switch is still done, but not felt.
     run(&mut manager, 1);
     assert_eq!(felt(&manager), Vec3::ZERO);
-    let told = removed(&manager);
+    let told = removed(&manager, OTHER);
     run(&mut manager, 10);
-    assert_eq!(removed(&manager), told);
+    assert_eq!(removed(&manager, OTHER), told);
 }
 
 /// A square patch of tissue at z = 0, 60 mm a side, pinned along its border.

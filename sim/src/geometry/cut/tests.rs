@@ -1,6 +1,6 @@
 //! Cuts of flat patches, whose triangles are all counter-clockwise as seen from above.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 
 use super::surface::edge;
@@ -166,6 +166,31 @@ fn a_cut_in_many_frames_is_the_same_as_in_one() {
     for node in &once.nodes {
         let near = |other: &CutNode| (other.rest - node.rest).length() < 1e-6;
         assert!(often.nodes.iter().any(near), "no node at {}", node.rest);
+    }
+}
+
+#[test]
+fn a_cut_goes_on_from_its_front_where_tissue_has_moved() {
+    // Within the triangles around the front, and beyond them on either side, ahead and behind.
+    for moved in [[0.6, -1.2], [2.0, -9.0], [-3.0, 8.0], [6.0, 0.5], [-8.0, -2.0]] {
+        let mut surface = patch();
+        let front = cut(&mut surface, &[[10.0, 11.3], [20.0, 16.0]]).expect("it is in the patch");
+        let parted = copies(&surface).len();
+        for node in &mut surface.nodes {
+            node.position += Vec3::new(moved[0], moved[1], 0.0) * 1e-3;
+        }
+        let sweep = Sweep { before: blade([20.0, 16.0]), now: blade([31.0, 21.0]) };
+        let next = surface.cut(sweep, Some(front)).expect("it still is");
+        assert!(copies(&surface).contains(&front), "{moved:?}: the old front is not parted");
+        assert!(copies(&surface).len() > parted + 1, "{moved:?}: it went on by one edge at most");
+        let off = surface.nodes[next as usize].position.truncate() - Vec2::new(0.031, 0.021);
+        assert!(off.length() < 1.2 * EDGE, "{moved:?}: the new front is {off} m from the blade");
+        assert!(!copies(&surface).contains(&next), "{moved:?}: the tip is parted");
+        assert_eq!(pieces(&surface), 1, "{moved:?}");
+        for node in &mut surface.nodes[..NODES * NODES] {
+            node.position = node.rest;
+        }
+        check(&surface);
     }
 }
 
