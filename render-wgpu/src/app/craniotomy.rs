@@ -87,7 +87,7 @@ fn run_beside<'c>(
             let recording = begin(&manager);
             let mut measure = Measure::new(args.frames, count);
             measure.start();
-            let picture = outputs.picture.as_deref();
+            let picture = outputs.picture.as_ref();
             let (manager, at_hand) =
                 window.run(manager, recording, args.frames, picture, &mut measure)?;
             (manager, at_hand.surgery, measure)
@@ -140,7 +140,7 @@ fn run_unwatched<'a, 'c, 'h>(
     recording.end(&manager);
     let measure = progress.end();
     if let Some(pictures) = pictures {
-        pictures.finish(outputs.picture.as_deref());
+        pictures.finish(outputs.picture.as_ref());
     }
     Ok((manager, surgery, measure))
 }

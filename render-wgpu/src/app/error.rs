@@ -1,6 +1,7 @@
 //! What can go wrong with a run.
 
 use std::io;
+use std::path::PathBuf;
 
 use dualframe_render_wgpu::error::GraphicsError;
 use dualframe_sim::device::thread::LoopError;
@@ -23,14 +24,16 @@ pub(super) enum RunError {
     Executor(#[from] ExecutorError),
     #[error(transparent)]
     Graphics(#[from] GraphicsError),
-    #[error("a picture cannot be written")]
-    Picture(#[source] io::Error),
-    #[error("the trace cannot be written")]
-    Trace(#[source] io::Error),
+    #[error("cannot write {}", path.display())]
+    Write {
+        path: PathBuf,
+        #[source]
+        source: io::Error,
+    },
+    #[error("there is no thread to write pictures")]
+    Writer(#[source] io::Error),
     #[error("the report cannot be printed")]
     Print(#[source] io::Error),
-    #[error("cannot write the JSON")]
-    Json(#[source] io::Error),
     #[error(transparent)]
     Record(#[from] RecordError),
     #[error("the recording failed before frame {frame}; it is whole up to an earlier one")]

@@ -60,8 +60,8 @@ impl Outputs {
 
     /// Writes what a timeline has, where there are one and a file for it.
     pub(super) fn write_trace(&self, timeline: Option<&Timeline>) -> Result<(), RunError> {
-        let Some((file, timeline)) = self.trace.as_deref().zip(timeline) else { return Ok(()) };
-        replace(file, |writer| timeline.write_chrome_trace(writer)).map_err(RunError::Trace)
+        let Some((file, timeline)) = self.trace.as_ref().zip(timeline) else { return Ok(()) };
+        file.replace(|writer| timeline.write_chrome_trace(writer))
     }
 }
 
@@ -89,6 +89,27 @@ impl Output {
 
     pub(super) fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Writes it anew.
+    pub(super) fn replace(
+        &self,
+        write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
+    ) -> Result<(), RunError> {
+        let written = empty(&self.file).and_then(|()| {
+            let mut writer = BufWriter::new(&self.file);
+            write(&mut writer)?;
+            writer.flush()
+        });
+        written.map_err(|source| RunError::Write { path: self.path.clone(), source })
+    }
+
+    /// Writes it anew, as one JSON object.
+    pub(super) fn write_json(&self, value: &impl Serialize) -> Result<(), RunError> {
+        self.replace(|writer| {
+            serde_json::to_writer(&mut *writer, value)?;
+            writer.write_all(b"\n")
+        })
     }
 }
 
@@ -172,17 +193,6 @@ pub(super) fn empty(file: &File) -> io::Result<()> {
     Ok(())
 }
 
-/// Writes a file anew.
-pub(super) fn replace<'a>(
-    file: &'a File,
-    write: impl FnOnce(&mut BufWriter<&'a File>) -> io::Result<()>,
-) -> io::Result<()> {
-    empty(file)?;
-    let mut writer = BufWriter::new(file);
-    write(&mut writer)?;
-    writer.flush()
-}
-
 /// Prints what came of a run.
 pub(super) fn print(
     write: impl FnOnce(&mut StdoutLock<'_>) -> io::Result<()>,
@@ -193,13 +203,4 @@ pub(super) fn print(
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(RunError::Print(error)),
         _ => Ok(()),
     }
-}
-
-/// Writes a file anew, as one JSON object.
-pub(super) fn write_json(file: &File, value: &impl Serialize) -> Result<(), RunError> {
-    let written = replace(file, |writer| {
-        serde_json::to_writer(&mut *writer, value)?;
-        writer.write_all(b"\n")
-    });
-    written.map_err(RunError::Json)
 }

@@ -57,7 +57,7 @@ pub(super) fn run(
             let recording = begin_recording(args, outputs, &manager, told);
             let mut measure = Measure::new(args.frames, count);
             measure.start();
-            let picture = outputs.picture.as_deref();
+            let picture = outputs.picture.as_ref();
             let (manager, _) =
                 window.run(manager, recording, args.frames, picture, &mut measure)?;
             report(args, &manager, spent, &measure, None)
@@ -107,7 +107,7 @@ fn run_unwatched(
     let measure = progress.end();
     let is_drawn = pictures.is_some();
     if let Some(pictures) = pictures {
-        pictures.finish(outputs.picture.as_deref());
+        pictures.finish(outputs.picture.as_ref());
     }
     let settings = manager.settings();
     let speed_up = match settings.executor {

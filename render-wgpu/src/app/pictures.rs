@@ -1,8 +1,7 @@
 //! Pictures without a window: of the last frame, or of every one.
 
 use std::ffi::OsStr;
-use std::fs::{self, File};
-use std::io;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
@@ -18,7 +17,7 @@ use dualframe_sim::render::Renderer;
 
 use super::args::Products;
 use super::error::RunError;
-use super::outputs;
+use super::outputs::Output;
 use super::told::Told;
 
 /// Pictures that wait to be written; usually 4.
@@ -66,7 +65,7 @@ impl<'a> Pictures<'a> {
             frame: 0,
             last: frames - 1,
             draws_every: args.offscreen,
-            sequence: sequence.map_err(RunError::Picture)?,
+            sequence: sequence?,
             failure: None,
             told,
         }))
@@ -77,7 +76,7 @@ impl<'a> Pictures<'a> {
     }
 
     /// Writes what is still to be written, the last frame's picture to `picture`.
-    pub(super) fn finish(mut self, picture: Option<&File>) {
+    pub(super) fn finish(mut self, picture: Option<&Output>) {
         self.end_sequence();
         let last = match self.failure.or_else(|| self.offscreen.painter.failure()) {
             Some(failure) => Err(failure.into()),
@@ -88,7 +87,7 @@ impl<'a> Pictures<'a> {
 
     fn end_sequence(&mut self) {
         if let Some(sequence) = self.sequence.take() {
-            self.told.attempt(sequence.finish().map_err(RunError::Picture));
+            self.told.attempt(sequence.finish());
         }
     }
 }
@@ -123,9 +122,12 @@ impl Renderer for Pictures<'_> {
 }
 
 /// Writes a picture to a file of the outputs.
-pub(super) fn write(picture: Result<Picture, GraphicsError>, file: &File) -> Result<(), RunError> {
+pub(super) fn write(
+    picture: Result<Picture, GraphicsError>,
+    file: &Output,
+) -> Result<(), RunError> {
     let picture = picture?;
-    outputs::replace(file, |writer| picture.write_png(writer)).map_err(RunError::Picture)
+    file.replace(|writer| picture.write_png(writer))
 }
 
 /// The file in `folder` that gets a frame's picture.
@@ -149,15 +151,19 @@ fn has_later(folder: &Path, frames: u64) -> bool {
 /// Pictures on their way to files, written by a thread of their own.
 struct Sequence {
     sender: SyncSender<(PathBuf, Picture)>,
-    writer: JoinHandle<io::Result<()>>,
+    writer: JoinHandle<Result<(), RunError>>,
     folder: PathBuf,
 }
 
 impl Sequence {
-    fn new(folder: &Path) -> io::Result<Self> {
+    fn new(folder: &Path) -> Result<Self, RunError> {
         let (sender, receiver) = sync_channel::<(PathBuf, Picture)>(WAITING);
-        let write = move || receiver.iter().try_for_each(|(file, picture)| picture.save(&file));
-        let writer = thread::Builder::new().name("pictures".to_owned()).spawn(write)?;
+        let save = |(path, picture): (PathBuf, Picture)| {
+            picture.save(&path).map_err(|source| RunError::Write { path, source })
+        };
+        let thread = thread::Builder::new().name("pictures".to_owned());
+        let writer = thread.spawn(move || receiver.iter().try_for_each(save));
+        let writer = writer.map_err(RunError::Writer)?;
         Ok(Self { sender, writer, folder: folder.to_owned() })
     }
 
@@ -166,7 +172,7 @@ impl Sequence {
         self.sender.send((file_of_frame(&self.folder, frame), picture)).is_ok()
     }
 
-    fn finish(self) -> io::Result<()> {
+    fn finish(self) -> Result<(), RunError> {
         drop(self.sender);
         match self.writer.join() {
             Ok(written) => written,

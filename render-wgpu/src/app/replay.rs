@@ -212,7 +212,7 @@ impl ReplayReport {
     }
 
     /// Writes the report as one JSON object.
-    pub(super) fn write(&self, file: &File) -> Result<(), RunError> {
-        outputs::write_json(file, self)
+    pub(super) fn write(&self, file: &Output) -> Result<(), RunError> {
+        file.write_json(self)
     }
 }

@@ -1,6 +1,5 @@
 //! What a run comes to: a table for people, JSON for programs.
 
-use std::fs::File;
 use std::io::Write;
 
 use dualframe_sim::executor::{Entry, StageSeconds};
@@ -14,7 +13,7 @@ use super::error::RunError;
 use super::haptics::HapticsReport;
 use super::manage::Spent;
 use super::measure::Measure;
-use super::outputs;
+use super::outputs::{self, Output};
 
 /// A run's report. The JSON keys stay as they are; more may come.
 #[derive(Serialize)]
@@ -229,8 +228,8 @@ impl Report {
     }
 
     /// Writes the report as one JSON object.
-    pub(super) fn write(&self, file: &File) -> Result<(), RunError> {
-        outputs::write_json(file, self)
+    pub(super) fn write(&self, file: &Output) -> Result<(), RunError> {
+        file.write_json(self)
     }
 
     /// Prints the closing table.

@@ -18,7 +18,6 @@ mod stats;
 mod surface;
 mod view;
 
-use std::fs::File;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -40,6 +39,7 @@ use super::args::{Products, Way, entry};
 use super::error::RunError;
 use super::manage::{Manage, Spent, can_go_on, go_on, manage, timeline_of};
 use super::measure::Measure;
+use super::outputs::Output;
 use super::pictures;
 use super::recording::Recording;
 use super::told::Told;
@@ -161,7 +161,7 @@ impl<'a, S: Scenario> Session<'a, S> {
         mut manager: VeManager,
         mut recording: Recording<'_>,
         frames: Option<u64>,
-        picture: Option<&File>,
+        picture: Option<&Output>,
         measure: &mut Measure<'_>,
     ) -> Result<(VeManager, S), RunError> {
         self.view.turn_to(self.scenario.look(), manager.mailbox());
