@@ -59,11 +59,6 @@ pub(super) fn timeline_of(products: &Products, workers: usize) -> Arc<Timeline> 
     Arc::new(Timeline::new(workers + 1, spans))
 }
 
-/// Whether an environment can go on after an error, without the threads that were asked for.
-pub(super) fn can_go_on(error: &ExecutorError) -> bool {
-    matches!(error, ExecutorError::Spawn(_) | ExecutorError::Pool(_))
-}
-
 /// A manager whose workers tell a timeline, if there is one, what they do.
 pub(super) fn manage(
     scene: Scene,

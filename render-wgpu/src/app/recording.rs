@@ -8,7 +8,6 @@ use dualframe_sim::record::{Control, Header, RecordError, Recorder, SceneSpec};
 use dualframe_sim::render::Renderer;
 
 use super::error::RunError;
-use super::manage::can_go_on;
 use super::outputs;
 use super::told::Told;
 
@@ -49,7 +48,7 @@ impl<'a> Recording<'a> {
             match recorder.run(manager, frames, renderer, on_frame) {
                 Ok(()) => return Ok(()),
                 Err(RecordError::Executor(error)) => {
-                    if !can_go_on(&error) {
+                    if !error.can_go_on() {
                         // The state depends on the schedule now: nothing may be recorded of it.
                         self.recorder = None;
                     }

@@ -142,6 +142,15 @@ pub enum ExecutorError {
     Pool(#[from] ::rayon::ThreadPoolBuildError),
 }
 
+impl ExecutorError {
+    /// Whether the environment can go on, without the threads that were asked for. After any other error that a run
+    /// ends with, its state may depend on who came when.
+    #[must_use]
+    pub fn can_go_on(&self) -> bool {
+        matches!(self, Self::Spawn(_) | Self::Pool(_))
+    }
+}
+
 /// The most threads an executor may have.
 pub const MAX_THREADS: usize = 256;
 

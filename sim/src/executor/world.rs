@@ -100,14 +100,10 @@ pub(super) fn scene(
 ) -> Scene {
     let mut objects: Vec<Object> = objects.collect();
     objects.sort_unstable_by_key(Object::id);
-    // What was sent to nobody is not for an object that is added. From outside it keeps its place: nothing that is
-    // posted later comes before it.
+    // An object's letter to nobody is not for one that is added. One from outside keeps its place, and goes to whoever
+    // has the number when it is processed: it may have been posted after the object is said to be added.
     let is_for_somebody = |letter: &Letter| (letter.to.0 as usize) < objects.len();
-    let from_outside = outside.take_letters(frame).map(|letter| match is_for_somebody(&letter) {
-        true => letter,
-        false => Letter { to: ObjectId::HOST, ..letter },
-    });
-    let mail = mail.filter(is_for_somebody).chain(from_outside).collect();
+    let mail = mail.filter(is_for_somebody).chain(outside.take_letters(frame)).collect();
     Scene { objects, stages, frame, mail, mailbox: outside.mailbox().clone() }
 }
 

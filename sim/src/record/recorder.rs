@@ -10,7 +10,7 @@ use super::flaw::RecordError;
 use super::header::Header;
 use super::journal::Journal;
 use super::wire::Encoder;
-use super::{CHECKPOINT_FRAMES, frames_to_checkpoint};
+use super::{CHECKPOINT_FRAMES, MAX_PAYLOAD, frames_to_checkpoint};
 use crate::executor::OnFrame;
 use crate::manager::VeManager;
 use crate::object::ObjectId;
@@ -33,7 +33,8 @@ const MANY_BYTES: usize = 1 << 18;
 /// Changes of rules are not recorded, and an environment with a callback budget is not repeatable.
 ///
 /// After an error, and if it is dropped, it records no longer, and the environment goes on as it would
-/// have; what was written is a recording that is cut off.
+/// have; what was written is a recording that is cut off. Only where threads could not be had
+/// ([`ExecutorError::can_go_on`](crate::executor::ExecutorError::can_go_on)) does it go on.
 pub struct Recorder<W: Write> {
     writer: ChunkWriter<W>,
     journal: Arc<Mutex<Journal>>,
@@ -48,7 +49,8 @@ impl<W: Write> Recorder<W> {
     /// Begins to record an environment that is at its start, and built as `header` says.
     ///
     /// # Errors
-    /// The environment is not before frame 0, or recorded already; the header cannot be written.
+    /// The environment is not before frame 0, or recorded already; the header cannot be written, or takes more than a
+    /// chunk's 16 MiB.
     pub fn begin(write: W, header: &Header, manager: &VeManager) -> Result<Self, RecordError> {
         let frame = manager.frame();
         if frame > 0 {
@@ -57,6 +59,9 @@ impl<W: Write> Recorder<W> {
         let mut writer = ChunkWriter::new(write)?;
         let mut bytes = Vec::new();
         header.encode(&mut Encoder(&mut bytes));
+        if bytes.len() > MAX_PAYLOAD {
+            return Err(RecordError::Full { frame });
+        }
         writer.write(Kind::Header, &bytes)?;
         let journal = Arc::new(Mutex::new(Journal::new()));
         if !manager.mailbox().record(&journal) {
@@ -87,7 +92,12 @@ impl<W: Write> Recorder<W> {
         loop {
             let frame = manager.frame();
             let piece = frames_to_checkpoint(frame).min(end - frame);
-            manager.run(piece, renderer, on_frame)?;
+            let run = manager.run(piece, renderer, on_frame);
+            if run.as_ref().is_err_and(|error| !error.can_go_on()) {
+                // What is there now could not be repeated.
+                self.lock().end();
+            }
+            run?;
             if frames_to_checkpoint(manager.frame()) == CHECKPOINT_FRAMES {
                 self.checkpoint(manager)?;
             }

@@ -51,6 +51,7 @@ fn no_image() {
     refused_nifti("NIfTI-2", |file| file.sizeof_hdr = 540, &format!("NIfTI-2 {only}"));
     let detached = format!("NRRD with a detached header {only}");
     refused_nrrd("modality", "data file: head.raw", &detached);
+    refused("without an empty line", b"NRRD0004\ndata file: head.raw\ntype: short\n", &detached);
 }
 
 #[test]

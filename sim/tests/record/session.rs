@@ -150,7 +150,11 @@ pub(crate) fn session(seed: u64, frames: u64, ways: &[Settings]) -> Session {
     Session { file, hashes, totals }
 }
 
-fn moved(manager: VeManager, way: Settings, change: impl FnOnce(&mut Scene)) -> VeManager {
+pub(crate) fn moved(
+    manager: VeManager,
+    way: Settings,
+    change: impl FnOnce(&mut Scene),
+) -> VeManager {
     let mut scene = manager.into_scene();
     change(&mut scene);
     VeManager::new(scene, way).expect("valid settings")

@@ -9,7 +9,7 @@ use dualframe_sim::record::{Flaw, Header, RecordError, Recorder, ReplayError};
 use dualframe_sim::render::NullRenderer;
 use dualframe_sim::scene::ParticleScene;
 
-use crate::session::{PARTICLES, add, read, replay, session, spec};
+use crate::session::{PARTICLES, add, moved, read, replay, session, spec};
 
 const FRAMES: u64 = 200;
 
@@ -49,6 +49,33 @@ fn a_session_replays_in_every_way() {
             assert_eq!((played.frames, played.checkpoints), (FRAMES, 5), "{seed}, {way:?}");
             assert_eq!(played.hash, session.last(), "{seed}, {way:?}, by {most}");
         }
+    }
+}
+
+/// A replay posts messages two frames ahead, before there is the object that this one is to.
+#[test]
+fn a_message_to_an_object_that_was_just_added_reaches_it_again() {
+    let mut manager =
+        VeManager::new(spec(5).build().expect("a valid scene"), serial()).expect("valid settings");
+    let header = Header::of(&spec(5));
+    let mut recorder = Recorder::begin(Vec::new(), &header, &manager).expect("a start");
+    let mut run = |manager: &mut VeManager, recorder: &mut Recorder<Vec<u8>>| {
+        recorder.run(manager, 10, &mut NullRenderer::new(), &mut |_| {}).expect("it runs");
+    };
+    run(&mut manager, &mut recorder);
+    let still = [0; 12];
+    recorder.objects(&manager, &still).expect("it is recorded");
+    manager = moved(manager, serial(), |scene| add(scene, &still));
+    let push = Message::Impulse { node: 0, impulse: [3e-3, 0.0, 0.0] };
+    // After particles and walls.
+    manager.mailbox().post(ObjectId(PARTICLES as u32 + 6), push);
+    run(&mut manager, &mut recorder);
+    let expected = manager.state_hash();
+    let (file, _) = recorder.finish(&manager).expect("it is written");
+    for way in all_ways() {
+        let played = replay(&file, way, u64::MAX).expect("a header");
+        assert!(played.error.is_none(), "{way:?}: {:?}", played.error);
+        assert_eq!((played.frames, played.letters, played.hash), (20, 1, expected), "{way:?}");
     }
 }
 

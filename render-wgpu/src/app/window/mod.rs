@@ -37,7 +37,7 @@ pub(super) use self::particles::ParticlesAtHand;
 use self::view::{Shown, View};
 use super::args::{Products, Way, entry};
 use super::error::RunError;
-use super::manage::{Manage, Spent, can_go_on, go_on, manage, timeline_of};
+use super::manage::{Manage, Spent, go_on, manage, timeline_of};
 use super::measure::Measure;
 use super::outputs::Output;
 use super::pictures;
@@ -246,7 +246,7 @@ impl<'a, S: Scenario> Session<'a, S> {
     /// were before.
     fn goes_on_after(&mut self, error: ExecutorError) -> bool {
         let asked = std::mem::replace(&mut self.view.controls.threads, self.hired);
-        let goes_on = can_go_on(&error) && asked != self.hired;
+        let goes_on = error.can_go_on() && asked != self.hired;
         self.told.failure(&error.into());
         goes_on
     }

@@ -22,10 +22,13 @@ impl Fields {
             line.clear();
             source.read_until(b'\n', &mut line)?;
             if line.pop_if(|byte| *byte == b'\n').is_none() {
-                return Err(match source.limit() {
-                    0 => ImageError::Header { most: MOST },
-                    left => ImageError::Truncated { part: "header", needed: MOST - left + 1 },
-                });
+                let fields = Self(fields);
+                return match source.limit() {
+                    0 => Err(ImageError::Header { most: MOST }),
+                    // No data follow, before which an empty line would have to be.
+                    left if fields.are_detached() => Ok((fields, MOST - left)),
+                    left => Err(ImageError::Truncated { part: "header", needed: MOST - left + 1 }),
+                };
             }
             line.pop_if(|byte| *byte == b'\r');
             let text = String::from_utf8_lossy(&line);
@@ -38,6 +41,11 @@ impl Fields {
                 insert(&mut fields, &text)?;
             }
         }
+    }
+
+    /// Whether they say that the data are in another file.
+    pub(super) fn are_detached(&self) -> bool {
+        ["data file", "datafile"].iter().any(|name| self.get(name).is_some())
     }
 
     pub(super) fn get(&self, name: &str) -> Option<&str> {

@@ -22,7 +22,7 @@ struct Axis {
 
 impl Header {
     pub(super) fn new(fields: &Fields) -> Result<Self, ImageError> {
-        if ["data file", "datafile"].iter().any(|name| fields.get(name).is_some()) {
+        if fields.are_detached() {
             return Err(ImageError::Kind { kind: "NRRD with a detached header" });
         }
         for name in ["byte skip", "byteskip", "line skip", "lineskip"] {
