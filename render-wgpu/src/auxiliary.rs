@@ -185,6 +185,9 @@ impl Units {
         let mut encoder = device.create_command_encoder(&Default::default());
         let encode = |unit| encode(unit, context, &mut encoder);
         let encoded: Vec<_> = now.into_iter().filter_map(encode).collect();
+        if encoded.is_empty() {
+            return;
+        }
         queue.submit([encoder.finish()]);
         // A failure is each unit's.
         let _ = context.gpu.poll(PollType::wait_indefinitely());

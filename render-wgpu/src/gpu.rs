@@ -4,8 +4,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use wgpu::{
-    Adapter, AdapterInfo, Backends, Device, DeviceDescriptor, DownlevelFlags, Instance,
-    InstanceDescriptor, PollType, PowerPreference, Queue, RequestAdapterOptions, Surface,
+    Adapter, AdapterInfo, Backends, Buffer, BufferDescriptor, BufferUsages, Device,
+    DeviceDescriptor, DownlevelFlags, Instance, InstanceDescriptor, PollType, PowerPreference,
+    Queue, RequestAdapterOptions, Surface,
 };
 
 use crate::error::{GraphicsError, words_of};
@@ -95,6 +96,19 @@ impl Gpu {
     pub fn failure(&self) -> Option<GraphicsError> {
         let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
         failure.as_ref().map(|reason| GraphicsError::Lost { reason: reason.clone() })
+    }
+
+    /// A buffer with contents. Unlike wgpu's own helper it does not panic where the device has failed or has no memory
+    /// left.
+    pub(crate) fn buffer(&self, label: &str, contents: &[u8], usage: BufferUsages) -> Buffer {
+        let buffer = self.device.create_buffer(&BufferDescriptor {
+            label: Some(label),
+            size: contents.len() as u64,
+            usage: usage | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        self.queue.write_buffer(&buffer, 0, contents);
+        buffer
     }
 
     /// Lets the device get on with what was submitted, or waits for it. Unlike wgpu's own it does not panic where the

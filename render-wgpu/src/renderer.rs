@@ -158,9 +158,9 @@ impl Painter {
         }
         match &object.geometry {
             Geometry::Mesh(mesh) => {
-                surfaces.add_mesh(&gpu.device, layouts, object, mesh, view.look.coloring);
+                surfaces.add_mesh(gpu, layouts, object, mesh, view.look.coloring);
             }
-            Geometry::Rigid(rigid) => surfaces.add_rigid(&gpu.device, layouts, object, rigid),
+            Geometry::Rigid(rigid) => surfaces.add_rigid(gpu, layouts, object, rigid),
             Geometry::Volume(volume) => {
                 let added = volumes.add(&gpu.device, &gpu.queue, object, volume);
                 self.failure = added.err();

@@ -10,7 +10,7 @@ use dualframe_render_wgpu::renderer::Offscreen;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::{Entry, ExecutorKind};
 use dualframe_sim::manager::{Settings, VeManager};
-use dualframe_sim::render::NullRenderer;
+use dualframe_sim::render::{NullRenderer, Renderer};
 use dualframe_sim::scene::ParticleScene;
 use glam::Vec2;
 
@@ -68,4 +68,24 @@ fn the_run_goes_on() {
             assert!(matches!(answered.try_recv(), Err(TryRecvError::Disconnected)));
         }
     }
+}
+
+/// What is drawn first on a device that has failed, unnoticed: it has to be made there.
+#[test]
+#[ignore = "needs a graphics adapter; .ci/run has one"]
+fn what_is_new_fails_without_a_panic() {
+    let gpu = Gpu::new(None).expect("an adapter");
+    let look = Look::room(particles().room());
+    let mut offscreen =
+        Offscreen::new(gpu, look, Quality::Fast, (320, 200)).expect("the size is allowed");
+    let [known, others] =
+        [(); 2].map(|()| particles().build().expect("the number of particles is allowed").objects);
+    known.iter().for_each(|object| offscreen.draw(object));
+    offscreen.swap(0);
+    offscreen.draw(&known[0]);
+    offscreen.painter.gpu().device.destroy();
+    others.iter().for_each(|object| offscreen.draw(object));
+    offscreen.swap(1);
+    let failure = offscreen.painter.failure().expect("the device failed");
+    assert!(matches!(failure, GraphicsError::Lost { .. }), "{failure:?}");
 }

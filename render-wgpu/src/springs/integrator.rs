@@ -7,7 +7,6 @@ use std::sync::{Arc, Weak};
 use bytemuck::{Pod, Zeroable};
 use dualframe_sim::behavior::Springs;
 use dualframe_sim::geometry::Topology;
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, Buffer, BufferDescriptor, BufferUsages,
     CommandEncoder, ComputePipeline, ComputePipelineDescriptor, Device, DownlevelFlags,
@@ -90,7 +89,7 @@ impl Integrator {
             *body = None;
         }
         let body = body.get_or_insert_with(|| {
-            Body::new(device, pipeline, &task.topology, &self.table(device, &task.topology))
+            Body::new(device, pipeline, &task.topology, &self.table(gpu, &task.topology))
         });
         queue.write_buffer(&body.numbers, 0, bytemuck::bytes_of(&Numbers::new(task)));
         queue.write_buffer(&body.state, 0, bytemuck::cast_slice(nodes));
@@ -107,7 +106,7 @@ impl Integrator {
         Some(body.results.clone())
     }
 
-    fn table(&self, device: &Device, topology: &Arc<Topology>) -> Buffer {
+    fn table(&self, gpu: &Gpu, topology: &Arc<Topology>) -> Buffer {
         let mut tables = self.tables.borrow_mut();
         // An address that is still known to be in use is not given to another.
         let address = Arc::as_ptr(topology).addr();
@@ -115,11 +114,9 @@ impl Integrator {
             return table.clone();
         }
         tables.retain(|_, (known, _)| known.strong_count() > 0);
-        let table = device.create_buffer_init(&BufferInitDescriptor {
-            label: Some("springs"),
-            contents: bytemuck::cast_slice(&neighbour_table(topology)),
-            usage: BufferUsages::STORAGE,
-        });
+        let neighbours = neighbour_table(topology);
+        let neighbours = bytemuck::cast_slice(&neighbours);
+        let table = gpu.buffer("springs", neighbours, BufferUsages::STORAGE);
         tables.insert(address, (Arc::downgrade(topology), table.clone()));
         table
     }

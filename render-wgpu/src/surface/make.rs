@@ -7,10 +7,10 @@ use bytemuck::{Pod, Zeroable};
 use dualframe_sim::geometry::Topology;
 use glam::Vec3;
 use parry3d::shape::{Compound, SharedShape, TypedShape};
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
-use wgpu::{BindGroup, Buffer, BufferUsages, Device};
+use wgpu::{BindGroup, Buffer, BufferUsages};
 
 use super::layouts::Layouts;
+use crate::gpu::Gpu;
 
 /// The sides that a round shape is drawn with.
 const ROUND_SIDES: u32 = 32;
@@ -41,11 +41,9 @@ pub(super) struct Indices {
 }
 
 impl Indices {
-    fn new(device: &Device, indices: &[u32]) -> Self {
-        let contents = bytemuck::cast_slice(indices);
-        let usage = BufferUsages::INDEX;
-        let descriptor = BufferInitDescriptor { label: Some("indices"), contents, usage };
-        Self { buffer: device.create_buffer_init(&descriptor), count: indices.len() as u32 }
+    fn new(gpu: &Gpu, indices: &[u32]) -> Self {
+        let buffer = gpu.buffer("indices", bytemuck::cast_slice(indices), BufferUsages::INDEX);
+        Self { buffer, count: indices.len() as u32 }
     }
 }
 
@@ -78,7 +76,12 @@ impl Make {
         }
     }
 
-    pub(super) fn deformable(device: &Device, layouts: &Layouts, topology: &Arc<Topology>) -> Self {
+    /// Whether no body can be of this make any more.
+    pub(super) fn is_gone(&self) -> bool {
+        matches!(&self.likeness, Likeness::Deformable(topology) if Arc::strong_count(topology) == 1)
+    }
+
+    pub(super) fn deformable(gpu: &Gpu, layouts: &Layouts, topology: &Arc<Topology>) -> Self {
         let springs = topology.springs().iter();
         let rests: HashMap<_, _> =
             springs.map(|spring| (ordered(spring.nodes), spring.rest)).collect();
@@ -86,38 +89,32 @@ impl Make {
             rests.get(&pair).copied().unwrap_or(0.0)
         });
         let likeness = Likeness::Deformable(Arc::clone(topology));
-        Self::new(device, layouts, likeness, &surface)
+        Self::new(gpu, layouts, likeness, &surface)
     }
 
-    /// `None` for shapes without a bounded surface.
-    pub(super) fn rigid(device: &Device, layouts: &Layouts, shape: &SharedShape) -> Option<Self> {
+    /// `None` for shapes that have no [`outline`].
+    pub(super) fn rigid(gpu: &Gpu, layouts: &Layouts, shape: &SharedShape) -> Option<Self> {
         let (nodes, triangles) = outline(shape)?;
         let surface = Surface::new(nodes.len(), &triangles, |_| 0.0);
-        let mut make = Self::new(device, layouts, Likeness::Rigid(shape.clone()), &surface);
+        let mut make = Self::new(gpu, layouts, Likeness::Rigid(shape.clone()), &surface);
         let components = (0..3).flat_map(|axis| nodes.iter().map(move |node| node[axis]));
         // Its nodes have no velocities of their own.
         let at_rest = std::iter::repeat_n(0.0, 3 * nodes.len());
         let numbers: Vec<f32> = components.chain(at_rest).collect();
-        let buffer = device.create_buffer_init(&BufferInitDescriptor {
-            label: Some("rigid shape"),
-            contents: bytemuck::cast_slice(&numbers),
-            usage: BufferUsages::STORAGE,
-        });
-        make.own_numbers = Some(layouts.list(device, &buffer));
+        let numbers = bytemuck::cast_slice(&numbers);
+        let buffer = gpu.buffer("rigid shape", numbers, BufferUsages::STORAGE);
+        make.own_numbers = Some(layouts.list(&gpu.device, &buffer));
         Some(make)
     }
 
-    fn new(device: &Device, layouts: &Layouts, likeness: Likeness, surface: &Surface) -> Self {
-        let rings = device.create_buffer_init(&BufferInitDescriptor {
-            label: Some("rings"),
-            contents: bytemuck::cast_slice(&surface.rings),
-            usage: BufferUsages::STORAGE,
-        });
+    fn new(gpu: &Gpu, layouts: &Layouts, likeness: Likeness, surface: &Surface) -> Self {
+        let rings = bytemuck::cast_slice(&surface.rings);
+        let rings = gpu.buffer("rings", rings, BufferUsages::STORAGE);
         Self {
             likeness,
-            triangles: Indices::new(device, &surface.triangles),
-            edges: Indices::new(device, &surface.edges),
-            rings: layouts.list(device, &rings),
+            triangles: Indices::new(gpu, &surface.triangles),
+            edges: Indices::new(gpu, &surface.edges),
+            rings: layouts.list(&gpu.device, &rings),
             own_numbers: None,
             is_open: surface.is_open,
             nodes: surface.nodes,
@@ -178,7 +175,8 @@ fn ordered([a, b]: [u32; 2]) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// The surface of a bounded rigid shape.
+/// The surface of a rigid shape: nothing for what has none or no bounds, for single segments and triangles, and for
+/// shapes of others' making. Rounded shapes are drawn without their rounding, as far within.
 fn outline(shape: &SharedShape) -> Option<(Vec<Vec3>, Vec<[u32; 3]>)> {
     match shape.as_typed_shape() {
         TypedShape::Ball(shape) => Some(shape.to_trimesh(ROUND_SIDES, ROUND_SIDES / 2)),
@@ -187,22 +185,30 @@ fn outline(shape: &SharedShape) -> Option<(Vec<Vec3>, Vec<[u32; 3]>)> {
         TypedShape::Cylinder(shape) => Some(faceted(shape.to_trimesh(ROUND_SIDES))),
         TypedShape::Cone(shape) => Some(faceted(shape.to_trimesh(ROUND_SIDES))),
         TypedShape::ConvexPolyhedron(shape) => Some(faceted(shape.to_trimesh())),
+        TypedShape::RoundCuboid(shape) => Some(faceted(shape.inner_shape.to_trimesh())),
+        TypedShape::RoundCylinder(shape) => {
+            Some(faceted(shape.inner_shape.to_trimesh(ROUND_SIDES)))
+        }
+        TypedShape::RoundCone(shape) => Some(faceted(shape.inner_shape.to_trimesh(ROUND_SIDES))),
+        TypedShape::RoundConvexPolyhedron(shape) => Some(faceted(shape.inner_shape.to_trimesh())),
+        TypedShape::HeightField(shape) => Some(shape.to_trimesh()),
+        TypedShape::Voxels(shape) => Some(faceted(shape.to_trimesh())),
         TypedShape::TriMesh(shape) => Some((shape.vertices().to_vec(), shape.indices().to_vec())),
         TypedShape::Compound(shape) => together(shape),
         _ => None,
     }
 }
 
-/// The surfaces of a compound's parts, if they have one.
+/// The surfaces of those of a compound's parts that have one, if any has.
 fn together(compound: &Compound) -> Option<(Vec<Vec3>, Vec<[u32; 3]>)> {
     let (mut nodes, mut triangles) = (Vec::new(), Vec::new());
     for (pose, part) in compound.shapes() {
-        let (own, of_own) = outline(part)?;
+        let Some((own, of_own)) = outline(part) else { continue };
         let first = nodes.len() as u32;
         nodes.extend(own.into_iter().map(|node| pose.transform_point(node)));
         triangles.extend(of_own.into_iter().map(|triangle| triangle.map(|node| first + node)));
     }
-    Some((nodes, triangles))
+    (!triangles.is_empty()).then_some((nodes, triangles))
 }
 
 /// Gives every triangle nodes of its own, so that its edges look sharp.
@@ -245,6 +251,27 @@ mod tests {
         assert_eq!(second, of_one[0].map(|node| one[node as usize] + Vec3::X * 3.0));
         let unbounded = SharedShape::new(parry3d::shape::HalfSpace::new(Vec3::Y));
         assert!(outline(&unbounded).is_none());
+        // A part that has no surface hides none of the others.
+        let with = |part| SharedShape::compound(vec![(Pose::IDENTITY, part), parts[1].clone()]);
+        let line = SharedShape::segment(Vec3::ZERO, Vec3::X);
+        assert_eq!(outline(&with(line.clone())).expect("the ball").1.len(), of_one.len());
+        assert!(outline(&SharedShape::compound(vec![(Pose::IDENTITY, line)])).is_none());
+    }
+
+    #[test]
+    fn rounded_shapes_and_fields_are_drawn() {
+        let heights = parry3d::utils::Array2::repeat(3, 3, 0.5);
+        for shape in [
+            SharedShape::round_cuboid(1.0, 2.0, 3.0, 0.1),
+            SharedShape::round_cylinder(1.0, 2.0, 0.1),
+            SharedShape::round_cone(1.0, 2.0, 0.1),
+            SharedShape::heightfield(heights, Vec3::ONE),
+            SharedShape::voxels(Vec3::ONE, &[glam::IVec3::ZERO]),
+        ] {
+            let (nodes, triangles) = outline(&shape).expect("it has a surface");
+            let is_there = |&node: &u32| (node as usize) < nodes.len();
+            assert!(!triangles.is_empty() && triangles.as_flattened().iter().all(is_there));
+        }
     }
 
     #[test]

@@ -27,11 +27,12 @@ use self::make::{Indices, Make};
 use self::pipelines::Pipelines;
 pub(crate) use self::pipelines::{INSTANCES, SHADOW};
 use crate::error::GraphicsError;
+use crate::gpu::Gpu;
 use crate::look::Coloring;
 use crate::target::Format;
 
-/// Frames after which what is no longer drawn is forgotten: surfaces that are cut get a new make with
-/// every cut.
+/// Frames after which what is no longer drawn is forgotten. Of a surface that is cut, which gets a new make with every
+/// cut, the old one is at once.
 pub(crate) const KEPT_FRAMES: u64 = 600;
 
 /// What a body does as a whole: how it is turned, where it is and how fast it goes.
@@ -77,8 +78,9 @@ impl Surfaces {
             make.wires.clear();
         }
         let oldest = self.frame.saturating_sub(KEPT_FRAMES);
-        if self.makes.iter().any(|make| make.used < oldest) {
-            self.makes.retain(|make| make.used >= oldest);
+        let is_kept = |make: &Make| make.used >= oldest && !make.is_gone();
+        if !self.makes.iter().all(is_kept) {
+            self.makes.retain(is_kept);
             // Found again at their next drawing.
             self.by_address.clear();
             self.without_surface.clear();
@@ -90,7 +92,7 @@ impl Surfaces {
     /// Adds a deformable body.
     pub(crate) fn add_mesh(
         &mut self,
-        device: &Device,
+        gpu: &Gpu,
         layouts: &Layouts,
         object: &Object,
         mesh: &Mesh,
@@ -101,7 +103,7 @@ impl Surfaces {
             return;
         }
         let address = Arc::as_ptr(topology).addr();
-        let make = self.make(address, || Some(Make::deformable(device, layouts, topology)));
+        let make = self.make(address, || Some(Make::deformable(gpu, layouts, topology)));
         let Some(make) = make else { return };
         let first = self.sent.len() as u32;
         self.stage(&mesh.positions);
@@ -112,17 +114,17 @@ impl Surfaces {
         self.add(make, object, first, of_body);
     }
 
-    /// Adds a rigid shape. One without bounds is not drawn.
+    /// Adds a rigid shape. One without a bounded surface is not drawn.
     pub(crate) fn add_rigid(
         &mut self,
-        device: &Device,
+        gpu: &Gpu,
         layouts: &Layouts,
         object: &Object,
         rigid: &Rigid,
     ) {
         let address = Arc::as_ptr(&rigid.shape.0).addr();
         let is_new = !self.by_address.contains_key(&address);
-        let make = self.make(address, || Make::rigid(device, layouts, &rigid.shape));
+        let make = self.make(address, || Make::rigid(gpu, layouts, &rigid.shape));
         let Some(make) = make else {
             if is_new {
                 self.without_surface.push(rigid.shape.clone());
