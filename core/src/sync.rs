@@ -132,13 +132,13 @@ sites! {
     /// Acquire: pairs with `RING_TAIL_HELP`. Whoever sees this push also sees the cells before it,
     /// and cannot take the ring for empty because an earlier cell still looks unwritten.
     RING_TAIL_LOAD = Acquire;
-    /// Relaxed: re-validated by the CAS that follows.
+    /// Relaxed: re-validated by the CAS that follows; or a hint, a sleeper's behind `FENCE_SLEEP`.
     RING_CELL_LOOK = Relaxed;
     /// Release: publishes what the pusher wrote about the index to whoever pops it.
     RING_CELL_PUBLISH = Release;
     /// Release: the cell below the new tail was written, or seen written, before.
     RING_TAIL_HELP = Release;
-    /// Relaxed: a hint that is re-validated by the CAS on the head.
+    /// Relaxed: a hint that is re-validated by the CAS on the head; or a hint only, as `RING_CELL_LOOK`.
     RING_HEAD_LOAD = Relaxed;
     /// Acquire: pairs with `RING_CELL_PUBLISH`.
     RING_CELL_TAKE = Acquire;
@@ -157,7 +157,7 @@ sites! {
     /// Acquire: pairs with `ARRIVALS_PUBLISH`.
     ARRIVALS_READ = Acquire;
     /// Relaxed: lists of candidates and letters are walked only by the unit's updater, after
-    /// its countdown ended; those of modelled interactions do not change while workers run.
+    /// its countdown ended, letters after `MAIL_TAKE`; those of modelled interactions do not change while workers run.
     LIST_LINK = Relaxed;
     /// Relaxed: see `LIST_LINK`.
     LIST_FOLLOW = Relaxed;

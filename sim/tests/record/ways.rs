@@ -59,7 +59,7 @@ fn a_message_to_an_object_that_was_just_added_reaches_it_again() {
         VeManager::new(spec(5).build().expect("a valid scene"), serial()).expect("valid settings");
     let header = Header::of(&spec(5));
     let mut recorder = Recorder::begin(Vec::new(), &header, &manager).expect("a start");
-    let mut run = |manager: &mut VeManager, recorder: &mut Recorder<Vec<u8>>| {
+    let run = |manager: &mut VeManager, recorder: &mut Recorder<Vec<u8>>| {
         recorder.run(manager, 10, &mut NullRenderer::new(), &mut |_| {}).expect("it runs");
     };
     run(&mut manager, &mut recorder);

@@ -231,7 +231,7 @@ fn inbox() -> Result<(), String> {
     // SAFETY: there is one pool.
     #[expect(unsafe_code, reason = "an inbox apart from a pipeline")]
     let inbox = unsafe { Inbox::new() };
-    let sum: u32 = std::thread::scope(|scope| {
+    let (letters, sound) = std::thread::scope(|scope| {
         let (post, inbox) = (&post, &inbox);
         let send = move |sender| {
             for sequence in 0..TURNS {
@@ -245,17 +245,27 @@ fn inbox() -> Result<(), String> {
             }
         };
         let running: Vec<_> = (0..2).map(|sender| scope.spawn(move || send(sender))).collect();
-        let mut received = 0;
-        while received < 2 * TURNS {
-            let sound = |(from, message): (From, Vec<u32>)| message == [from.sequence; 4];
-            received +=
-                post.collect(inbox, Frame(1)).map(|letter| u32::from(sound(letter))).sum::<u32>();
+        let (mut letters, mut sound) = (0, 0);
+        let mut collect = || {
+            for (from, message) in post.collect(inbox, Frame(1)) {
+                letters += 1;
+                sound += u32::from(message == [from.sequence; 4]);
+            }
+        };
+        while !running.iter().all(|thread| thread.is_finished()) {
+            collect();
             std::thread::yield_now();
         }
         join(running);
-        received
+        collect();
+        (letters, sound)
     });
-    if sum == 2 * TURNS { Ok(()) } else { Err(format!("{sum} letters received")) }
+    let all = 2 * TURNS;
+    if (letters, sound) == (all, all) {
+        Ok(())
+    } else {
+        Err(format!("{letters} letters of {all} received, {sound} of them as they were sent"))
+    }
 }
 
 /// One thread publishes, three read: no value is torn, none is older than one read before.
