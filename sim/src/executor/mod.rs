@@ -9,7 +9,7 @@ mod engine;
 mod mail;
 #[cfg(feature = "native-peers")]
 mod native;
-mod on_panic;
+pub(crate) mod on_panic;
 mod outside;
 mod parallel_for;
 mod pipeline;

@@ -3,7 +3,7 @@
 use std::thread;
 
 /// Calls if its thread panics while it lives: the others would wait for what that thread had in hand.
-pub(super) struct OnPanic<F: Fn()>(pub(super) F);
+pub(crate) struct OnPanic<F: Fn()>(pub(crate) F);
 
 impl<F: Fn()> Drop for OnPanic<F> {
     fn drop(&mut self) {

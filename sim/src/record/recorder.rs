@@ -12,6 +12,7 @@ use super::journal::Journal;
 use super::wire::Encoder;
 use super::{CHECKPOINT_FRAMES, MAX_PAYLOAD, frames_to_checkpoint};
 use crate::executor::OnFrame;
+use crate::executor::on_panic::OnPanic;
 use crate::manager::VeManager;
 use crate::object::ObjectId;
 use crate::render::Renderer;
@@ -56,12 +57,12 @@ impl<W: Write> Recorder<W> {
         if frame > 0 {
             return Err(RecordError::Begun { frame });
         }
-        let mut writer = ChunkWriter::new(write)?;
         let mut bytes = Vec::new();
         header.encode(&mut Encoder(&mut bytes));
         if bytes.len() > MAX_PAYLOAD {
             return Err(RecordError::Full { frame });
         }
+        let mut writer = ChunkWriter::new(write)?;
         writer.write(Kind::Header, &bytes)?;
         let journal = Arc::new(Mutex::new(Journal::new()));
         if !manager.mailbox().record(&journal) {
@@ -81,6 +82,9 @@ impl<W: Write> Recorder<W> {
     /// The executor cannot go on, or what was recorded cannot be written, or frames were run without the recorder, so
     /// that the last checkpoint is more than [`CHECKPOINT_FRAMES`] ago. Frames may be left to do then:
     /// [`VeManager::frame`] says how far it came.
+    ///
+    /// # Panics
+    /// As [`VeManager::run`]; nothing is recorded any more then.
     pub fn run(
         &mut self,
         manager: &mut VeManager,
@@ -89,12 +93,14 @@ impl<W: Write> Recorder<W> {
         on_frame: &mut OnFrame<'_>,
     ) -> Result<(), RecordError> {
         let end = manager.frame().saturating_add(frames);
+        let journal = Arc::clone(&self.journal);
+        // What a panic leaves could not be repeated, as what an error does.
+        let _guard = OnPanic(|| journal.lock().unwrap_or_else(PoisonError::into_inner).end());
         loop {
             let frame = manager.frame();
             let piece = frames_to_checkpoint(frame).min(end - frame);
             let run = manager.run(piece, renderer, on_frame);
             if run.as_ref().is_err_and(|error| !error.can_go_on()) {
-                // What is there now could not be repeated.
                 self.lock().end();
             }
             run?;

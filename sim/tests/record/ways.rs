@@ -1,12 +1,15 @@
 //! Whatever ran when a session was recorded, and whatever runs when it is replayed.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
 use dualframe_sim::blocking::Grain;
-use dualframe_sim::executor::{Entry, ExecutorKind, FrameRecord, OnFrame};
+use dualframe_sim::executor::{Entry, ExecutorError, ExecutorKind, FrameRecord, OnFrame};
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::message::{Custom, Message};
 use dualframe_sim::object::{Object, ObjectId};
-use dualframe_sim::record::{Flaw, Header, RecordError, Recorder, ReplayError};
-use dualframe_sim::render::NullRenderer;
+use dualframe_sim::record::wire::{Decoder, Encoder, Malformed};
+use dualframe_sim::record::{Flaw, Header, RecordError, Recorder, ReplayError, SceneSpec};
+use dualframe_sim::render::{NullRenderer, Renderer};
 use dualframe_sim::scene::ParticleScene;
 
 use crate::session::{PARTICLES, add, moved, read, replay, session, spec};
@@ -123,6 +126,62 @@ fn a_session_that_did_not_begin() {
     manager.run(1, &mut NullRenderer::new(), &mut |_| {}).expect("it runs");
     let begun = Recorder::begin(Vec::new(), &Header::of(&spec), &manager);
     assert!(matches!(begun, Err(RecordError::Begun { frame: 1 })));
+}
+
+/// What a panic leaves are objects of different frames.
+#[test]
+fn what_was_broken_off_is_recorded_no_more() {
+    struct Breaking;
+    impl Renderer for Breaking {
+        fn draw(&mut self, _: &Object) {}
+
+        fn swap(&mut self, frame: u64) {
+            assert_ne!(frame, 7);
+        }
+    }
+    for is_seen in [true, false] {
+        let scene = spec(5).build().expect("a valid scene");
+        let mut manager = VeManager::new(scene, serial()).expect("valid settings");
+        let header = Header::of(&spec(5));
+        let mut recorder = Recorder::begin(Vec::new(), &header, &manager).expect("a start");
+        let run = || match is_seen {
+            true => recorder.run(&mut manager, 20, &mut Breaking, &mut |_| {}).is_ok(),
+            false => manager.run(20, &mut Breaking, &mut |_| {}).is_ok(),
+        };
+        assert!(catch_unwind(AssertUnwindSafe(run)).is_err());
+        if !is_seen {
+            let run = recorder.run(&mut manager, 1, &mut NullRenderer::new(), &mut |_| {});
+            assert!(matches!(run, Err(RecordError::Executor(ExecutorError::BrokenOff))));
+        }
+        assert!(matches!(recorder.finish(&manager), Err(RecordError::Over)));
+    }
+}
+
+/// A scene that takes so many bytes.
+struct Large(usize);
+
+impl SceneSpec for Large {
+    const KIND: &'static str = "large";
+
+    fn encode(&self, to: &mut Encoder<'_>) {
+        to.bytes(&vec![0; self.0]);
+    }
+
+    fn decode(_: &mut Decoder<'_>) -> Result<Self, Malformed> {
+        Err(Malformed::Ended)
+    }
+}
+
+#[test]
+fn a_scene_that_a_chunk_cannot_hold_is_refused_at_once() {
+    let scene = spec(5).build().expect("a valid scene");
+    let manager = VeManager::new(scene, serial()).expect("valid settings");
+    let mut file = Vec::new();
+    let begun = Recorder::begin(&mut file, &Header::of(&Large(1 << 24)), &manager).map(drop);
+    assert!(matches!(begun, Err(RecordError::Full { frame: 0 })), "{begun:?}");
+    assert!(file.is_empty());
+    let begun = Recorder::begin(&mut file, &Header::of(&Large(1 << 23)), &manager).map(drop);
+    assert!(begun.is_ok(), "{begun:?}");
 }
 
 /// A run of no frames takes no message that the recorder does not see.
