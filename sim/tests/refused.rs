@@ -1,6 +1,9 @@
 //! A scene that no executor could be made of comes back as it was.
 #![forbid(unsafe_code)]
 
+#[cfg(unix)]
+use std::thread;
+
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::{Entry, ExecutorError, ExecutorKind, MAX_THREADS, Refused};
 use dualframe_sim::manager::{Settings, VeManager};
@@ -77,17 +80,41 @@ fn without_memory_for_threads() {
     }
 }
 
+/// [`threads_that_cannot_be_had`].
+#[cfg(unix)]
+#[test]
+#[ignore = "run by another test, within limits"]
+fn without_memory_for_one_thread_more() {
+    let expected = run(scene(), SERIAL).state_hash();
+    // Those that were joined are gone, which a pool's may be only later.
+    let most = thread::scope(|scope| {
+        let waits = || thread::Builder::new().spawn_scoped(scope, thread::park);
+        let waiting: Vec<_> = std::iter::from_fn(|| waits().ok()).collect();
+        waiting.iter().for_each(|thread| thread.thread().unpark());
+        waiting.len()
+    });
+    // With all that there can be in its pool, nobody is left to compute beside who renders.
+    let settings = settings(ExecutorKind::RayonOverlapped, most);
+    let mut manager = VeManager::new(scene(), settings).expect("as many as there were");
+    let ran = manager.run(FRAMES, &mut NullRenderer::new(), &mut |_| ());
+    assert!(matches!(ran, Err(ExecutorError::Spawn(_))), "{most} threads: {ran:?}");
+    assert!(ran.is_err_and(|error| error.can_go_on()));
+    assert_eq!(run(manager.into_scene(), SERIAL).state_hash(), expected);
+}
+
 #[cfg(unix)]
 #[test]
 fn threads_that_cannot_be_had() {
     let test = std::env::current_exe().expect("this one");
     // Some twenty threads' stacks of 1 GiB, and about half of one, in KiB: so that there is memory for all else.
-    let script = "ulimit -v 21495808; exec \"$0\" --ignored --exact without_memory_for_threads";
-    let child = std::process::Command::new("sh")
-        .args(["-c".as_ref(), script.as_ref(), test.as_os_str()])
-        .envs([("RUST_MIN_STACK", "1073741824"), ("MALLOC_ARENA_MAX", "1")])
-        .output()
-        .expect("there is a shell");
-    let said = String::from_utf8_lossy(&child.stdout);
-    assert!(child.status.success() && said.contains("1 passed"), "{child:?}");
+    let script = "ulimit -v 21495808; exec \"$0\" --ignored --exact \"$1\"";
+    for limited in ["without_memory_for_threads", "without_memory_for_one_thread_more"] {
+        let child = std::process::Command::new("sh")
+            .args(["-c".as_ref(), script.as_ref(), test.as_os_str(), limited.as_ref()])
+            .envs([("RUST_MIN_STACK", "1073741824"), ("MALLOC_ARENA_MAX", "1")])
+            .output()
+            .expect("there is a shell");
+        let said = String::from_utf8_lossy(&child.stdout);
+        assert!(child.status.success() && said.contains("1 passed"), "{child:?}");
+    }
 }

@@ -180,7 +180,8 @@ pub trait Executor: Send {
     /// table of blocks that meet, which grows every
     /// [`FRAMES_PER_BLOCKING`](crate::blocking::FRAMES_PER_BLOCKING) frames, is full. The environment cannot go
     /// on then: a frame without some of its interactions would not be the same for every schedule. Or the
-    /// pipeline's pool was enlarged and the threads cannot be had; frames before that are done, and it can go on.
+    /// pipeline's pool was enlarged and the threads cannot be had, or the one that computes beside a renderer; frames
+    /// before that are done, and it can go on, once no more threads are asked for than can be had.
     ///
     /// # Panics
     /// If the renderer or `on_frame` does. The objects are still there, some of them a frame or two ahead of

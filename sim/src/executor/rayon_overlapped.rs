@@ -2,6 +2,7 @@
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, Builder};
 
 use super::clock::{Clock, Running, Stage, StageSeconds};
 use super::engine::Engine;
@@ -73,9 +74,10 @@ impl Executor for RayonOverlappedExecutor {
         let outside = Arc::clone(&self.engine.world.outside);
         outside.begin(self.engine.frame);
         let (engine, loops) = (&mut self.engine, &self.loops);
-        let unused = std::thread::scope(|scope| {
+        let unused = thread::scope(|scope| {
             let work = move || loops.enter(|| compute(engine, loops, frames, unused, &taken_in));
-            let computing = scope.spawn(work);
+            let computing =
+                Builder::new().spawn_scoped(scope, work).map_err(ExecutorError::Spawn)?;
             // Both ends are dropped if the renderer panics, so that nobody waits for it then.
             let (used, taken_out) = (used, taken_out);
             for Taken { frame, pairs, picture } in taken_out {
@@ -91,8 +93,8 @@ impl Executor for RayonOverlappedExecutor {
                 give_back(&used, picture);
             }
             drop(used);
-            computing.join()
-        });
+            Ok::<_, ExecutorError>(computing.join())
+        })?;
         match unused {
             Ok(unused) => self.pictures.extend(unused),
             Err(panic) => std::panic::resume_unwind(panic),

@@ -1,4 +1,6 @@
 //! What the field uses elsewhere: OpenMP and oneTBB themselves, through C++.
+//!
+//! They make their threads when the first loop runs, and end the process where the system gives none.
 
 mod shim;
 mod tbb_pipeline;

@@ -1,7 +1,7 @@
 // The native peers' loops: real OpenMP and real oneTBB, called by shim.rs and calling it back.
 //
-// Callbacks never unwind: shim.rs catches panics. The functions are noexcept, so the only exception
-// there can be, memory that is not to be had, ends the process, as it does in Rust.
+// Callbacks never unwind: shim.rs catches panics. The functions are noexcept, so memory that is not to be had ends the
+// process, as it does in Rust. So do threads that are not to be had: OpenMP's runtime knows no other way.
 
 #include <cstddef>
 #include <omp.h>
