@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 
 use dualframe_sim::behavior::tissue::{Material, Pin, Tissue};
-use dualframe_sim::behavior::{Bone, Instrument, Tool, Workpieces};
+use dualframe_sim::behavior::{Bone, Fixed, Instrument, Tool, Workpieces};
 use dualframe_sim::device::DeviceSample;
 use dualframe_sim::executor::ExecutorKind;
 use dualframe_sim::geometry::Geometry;
@@ -373,4 +373,19 @@ fn poses_that_are_no_numbers_are_ignored() {
     run(&mut manager, 3);
     assert_eq!(tip(&manager), Vec3::ZERO);
     assert!(manager.quarantined().is_empty());
+}
+
+/// A block's copies for a renderer are used again for whoever comes to be in its place.
+#[test]
+fn a_copy_for_renderers_is_no_tool_once_it_is_of_something_else() {
+    let (rigid, tool) =
+        Tool::new(Instrument::Forceps, DeviceSample::at(Vec3::ZERO), Workpieces::default());
+    let bare = Object::new(OTHER, Group(0), Geometry::Rigid(rigid.clone()), Fixed);
+    let tool = Object::new(TOOL, Group(0), Geometry::Rigid(rigid), tool);
+    let mut copy = bare.snapshot();
+    assert!(Tool::of(&copy).is_none());
+    tool.snapshot_into(&mut copy);
+    assert!(Tool::of(&copy).is_some());
+    bare.snapshot_into(&mut copy);
+    assert!(Tool::of(&copy).is_none());
 }

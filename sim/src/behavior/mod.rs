@@ -59,10 +59,12 @@ pub trait Behavior: Any + Send + Sync {
         false
     }
 
-    /// Copies what a renderer may ask of this behaviour to that of a snapshot, which is a
-    /// [`Fixed`] at first; by default it may ask nothing. A panic here ends the run: a picture is not an
-    /// update, of which an object could be excluded.
-    fn show_in(&self, _snapshot: &mut Box<dyn Behavior>) {}
+    /// Makes the behaviour of a snapshot what a renderer may ask of this one; by default it may ask nothing, and that is a
+    /// [`Fixed`]. What it was may be of an earlier frame, or of another object. A panic here ends the run: a picture is
+    /// not an update, of which an object could be excluded.
+    fn show_in(&self, snapshot: &mut Box<dyn Behavior>) {
+        *snapshot = Box::new(Fixed);
+    }
 
     /// The bit that a tool is drilling with, if it is a drill; by default it is none.
     fn burr(&self, _geometry: &Geometry) -> Option<Burr> {
