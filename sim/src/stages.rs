@@ -211,15 +211,17 @@ impl Stages {
                     object.behavior.update(&mut object.geometry, &mut input);
                 }
             }
+            if waits {
+                // Its springs are advanced with those of others, and then it is refreshed.
+            } else if began.is_some_and(|(began, budget)| began.elapsed() > budget) {
+                object.quarantine(Fault { kind: FaultKind::OverBudget, frame });
+            } else if object.quarantined().is_none() && (changed || !object.is_finite()) {
+                // Its shape may be the host's, too.
+                object.refresh(frame, self.simd);
+            }
         }));
         if done.is_err() {
             object.quarantine(Fault { kind: FaultKind::Panicked, frame });
-        } else if waits {
-            // Its springs are advanced with those of others, and then it is refreshed.
-        } else if began.is_some_and(|(began, budget)| began.elapsed() > budget) {
-            object.quarantine(Fault { kind: FaultKind::OverBudget, frame });
-        } else if object.quarantined().is_none() && (changed || !object.is_finite()) {
-            object.refresh(frame, self.simd);
         }
     }
 

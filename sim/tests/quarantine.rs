@@ -18,8 +18,11 @@ use dualframe_sim::message::{Custom, Message};
 use dualframe_sim::object::{FaultKind, Group, Object, ObjectId};
 use dualframe_sim::scene::Scene;
 use glam::{Quat, Vec3};
+use parry3d::bounding_volume::{Aabb, BoundingSphere};
+use parry3d::mass_properties::MassProperties;
 use parry3d::math::Pose;
-use parry3d::shape::SharedShape;
+use parry3d::query::{PointProjection, PointQuery, Ray, RayCast, RayIntersection};
+use parry3d::shape::{Ball, FeatureId, Shape, ShapeType, SharedShape, TypedShape};
 
 /// More than have a block each.
 const CROWD: usize = 100;
@@ -94,6 +97,79 @@ fn the_culprit_would_have_touched_the_others() {
 #[test]
 fn a_panic() {
     only_the_culprit_goes(|_| panic!("on purpose"), FaultKind::Panicked);
+}
+
+/// A ball that no box can be had of.
+#[derive(Clone)]
+struct Boxless(Ball);
+
+impl RayCast for Boxless {
+    fn cast_local_ray_and_get_normal(
+        &self,
+        ray: &Ray,
+        most: f32,
+        solid: bool,
+    ) -> Option<RayIntersection> {
+        self.0.cast_local_ray_and_get_normal(ray, most, solid)
+    }
+}
+
+impl PointQuery for Boxless {
+    fn project_local_point(&self, point: Vec3, solid: bool) -> PointProjection {
+        self.0.project_local_point(point, solid)
+    }
+
+    fn project_local_point_and_get_feature(&self, point: Vec3) -> (PointProjection, FeatureId) {
+        self.0.project_local_point_and_get_feature(point)
+    }
+}
+
+impl Shape for Boxless {
+    fn compute_local_aabb(&self) -> Aabb {
+        panic!("on purpose")
+    }
+
+    fn compute_local_bounding_sphere(&self) -> BoundingSphere {
+        self.0.compute_local_bounding_sphere()
+    }
+
+    fn clone_dyn(&self) -> Box<dyn Shape> {
+        Box::new(self.clone())
+    }
+
+    fn scale_dyn(&self, scale: Vec3, parts: u32) -> Option<Box<dyn Shape>> {
+        self.0.scale_dyn(scale, parts)
+    }
+
+    fn mass_properties(&self, density: f32) -> MassProperties {
+        self.0.mass_properties(density)
+    }
+
+    fn shape_type(&self) -> ShapeType {
+        ShapeType::Custom
+    }
+
+    fn as_typed_shape(&self) -> TypedShape<'_> {
+        TypedShape::Custom(self)
+    }
+
+    fn ccd_thickness(&self) -> f32 {
+        self.0.ccd_thickness()
+    }
+
+    fn ccd_angular_thickness(&self) -> f32 {
+        self.0.ccd_angular_thickness()
+    }
+}
+
+/// A host's own shape is asked for its box after the update, and that may panic, too.
+#[test]
+fn a_shapes_panic() {
+    let worst = |geometry: &mut Geometry| {
+        let shape = SharedShape::new(Boxless(Ball::new(0.1)));
+        *geometry = Geometry::Rigid(Rigid::new(shape, Pose::IDENTITY));
+    };
+    only_the_culprit_goes(worst, FaultKind::Panicked);
 }
 
 #[test]
