@@ -68,15 +68,21 @@ fn every_object_is_drawn_once_a_frame() {
     }
 }
 
-/// Panics when it is given one object.
+/// Panics when it is given one object, and is not to be given anything more.
 struct Failing {
     object: ObjectId,
+    draws_since: Option<u32>,
     is_bound: bool,
 }
 
 impl Renderer for Failing {
     fn draw(&mut self, object: &Object) {
-        assert_ne!(object.id(), self.object, "the device is lost");
+        if let Some(draws) = &mut self.draws_since {
+            *draws += 1;
+        } else if object.id() == self.object {
+            self.draws_since = Some(0);
+            panic!("the device is lost");
+        }
     }
 
     fn swap(&mut self, _frame: u64) {}
@@ -91,11 +97,11 @@ fn a_renderers_panic_comes_back_to_the_caller() {
     for &executor in ExecutorKind::ALL {
         for (object, is_bound) in [(7, true), (7, false), (93, false)] {
             let mut manager = manager(executor, 2);
-            let mut renderer = Failing { object: ObjectId(object), is_bound };
+            let mut renderer = Failing { object: ObjectId(object), draws_since: None, is_bound };
             let run = AssertUnwindSafe(|| manager.run(1, &mut renderer, &mut |_| ()));
             let panic = catch_unwind(run).expect_err("it panics");
-            let text = panic.downcast_ref::<String>().expect("a message");
-            assert!(text.contains("the device is lost"), "{executor:?}: {text}");
+            assert_eq!(panic.downcast_ref(), Some(&"the device is lost"), "{executor:?}");
+            assert_eq!(renderer.draws_since, Some(0), "{executor:?}");
         }
     }
 }

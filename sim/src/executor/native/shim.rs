@@ -117,7 +117,10 @@ impl Tbb {
             // SAFETY: the source gives every number once, and this is the last filter that has it.
             let item = unsafe { items.lend(index) };
             let mut finish = finish.lock().unwrap_or_else(PoisonError::into_inner);
-            caught.run(|| finish(worker, index, item));
+            // Nobody is to be given what a panic has left.
+            if !caught.has_any() {
+                caught.run(|| finish(worker, index, item));
+            }
         };
         // SAFETY: the arena is alive as long as `self`. Both closures may be called on any of its
         // threads, and are alive until the pipeline is empty, which is when the call returns.
@@ -200,6 +203,10 @@ impl Caught {
         if let Err(panic) = catch_unwind(AssertUnwindSafe(work)) {
             self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(panic);
         }
+    }
+
+    fn has_any(&self) -> bool {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).is_some()
     }
 
     fn resume(self) {
