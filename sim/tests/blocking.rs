@@ -140,3 +140,18 @@ fn wrong_numbers_and_too_many_objects() {
     let expected = BlockingError::TooManyObjects { objects: limit + 1, limit };
     assert_eq!(error(many, Grain::Pairwise), expected);
 }
+
+#[test]
+fn every_home_has_its_share_of_solitary_objects() {
+    let solitary = particles(300, false, true).objects.into_iter().map(Object::solitary).collect();
+    let (mut blocking, mut blocks) =
+        Blocking::new(solitary, Grain::Spatial, 4).expect("particles are well formed");
+    blocks.iter_mut().for_each(|block| blocking.drain(block));
+    blocking.deal(2, 0.0);
+    blocks.iter_mut().enumerate().for_each(|(index, block)| blocking.fill(index, block));
+    let mut of_home = [0, 0];
+    for (index, block) in blocks.iter().enumerate() {
+        of_home[blocking.home(index) as usize] += block.objects().len();
+    }
+    assert!(of_home.iter().all(|&objects| objects >= 140), "{of_home:?}");
+}

@@ -80,6 +80,8 @@ pub struct Blocking {
     /// Of the block that is being filled.
     order: Vec<Order>,
     moving_blocks: usize,
+    /// The last of all.
+    solitary_blocks: usize,
     /// Moving objects are shared out so many at a time: as many as are advanced side by side, or one by one.
     share: usize,
     /// Room for objects in every block of moving ones: how many each has changes.
@@ -146,7 +148,7 @@ impl Blocking {
             Grain::Pairwise => objects,
             Grain::Spatial => block_count(objects, workers),
         };
-        let (moving_blocks, solitary_blocks) = (count(moving.len()), count(solitary.len()));
+        let moving_blocks = count(moving.len());
         let scenery = match grain {
             Grain::Pairwise => scenery.into_iter().map(|id| Members::of(vec![id])).collect(),
             Grain::Spatial => group_scenery(&objects, scenery, workers),
@@ -157,14 +159,25 @@ impl Blocking {
         let mut members = Vec::new();
         members.resize_with(moving_blocks, empty);
         members.extend(scenery);
-        let size = solitary.len().div_ceil(solitary_blocks.max(1)).max(1);
-        members.extend(solitary.chunks(size).map(|ids| Members::of(ids.to_vec())));
+        let size = solitary.len().div_ceil(count(solitary.len()).max(1)).max(1);
+        let solitary = solitary.chunks(size).map(|ids| Members::of(ids.to_vec()));
+        let solitary_blocks = solitary.len();
+        members.extend(solitary);
         let mut blocks = Vec::new();
         blocks.resize_with(members.len(), Block::default);
         let keys = Vec::with_capacity(moving.len());
         let order = Vec::with_capacity(room);
-        let mut blocking =
-            Self { objects, moving, members, keys, order, moving_blocks, share, room };
+        let mut blocking = Self {
+            objects,
+            moving,
+            members,
+            keys,
+            order,
+            moving_blocks,
+            solitary_blocks,
+            share,
+            room,
+        };
         blocking.split();
         for (index, block) in blocks.iter_mut().enumerate() {
             blocking.fill(index, block);
@@ -189,11 +202,17 @@ impl Blocking {
 
     /// The same for so many homes, which get as much of the work as makes them take equally long, as far as that is
     /// known. Who works at home 0 does something else too, for `besides` seconds a frame. Blocks of one home are close
-    /// in space, and each has its longest blocks first, so that none of its last is long.
+    /// in space, and each has its longest blocks first, so that none of its last is long. Of solitary objects each home
+    /// has as many blocks.
     pub fn deal(&mut self, homes: u32, besides: f32) {
         self.list();
+        let homes = homes.max(1);
+        let first_solitary = self.members.len() - self.solitary_blocks;
+        for (place, members) in self.members[first_solitary..].iter_mut().enumerate() {
+            members.home = place as u32 % homes;
+        }
         let members = &mut self.members[..self.moving_blocks];
-        split::among_homes(&mut self.keys, members, 0..homes.max(1), self.share, besides);
+        split::among_homes(&mut self.keys, members, 0..homes, self.share, besides);
         members.iter_mut().enumerate().for_each(|(place, members)| members.place = place);
         members.sort_unstable_by_key(Members::order);
     }
