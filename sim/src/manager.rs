@@ -123,7 +123,7 @@ impl VeManager {
         done
     }
 
-    /// How the environment is run, with as many threads as there are now.
+    /// How the environment is run, with as many threads as are asked for now.
     #[must_use]
     pub fn settings(&self) -> Settings {
         let threads = match self.settings.executor {
