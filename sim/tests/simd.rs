@@ -224,6 +224,46 @@ fn bodies_beside_others_far_away_and_fast() {
     }
 }
 
+/// A ring in a plane at a height of −0, too small, in which springs push along that plane.
+fn ring(id: u32) -> Object {
+    const NODES: u32 = 20;
+    let angle = |node: u32| std::f32::consts::TAU * node as f32 / NODES as f32;
+    let place = |node: u32| Vec3::new(angle(node).cos(), -0.0, angle(node).sin());
+    let positions: Vec<Vec3> = (0..NODES).map(place).collect();
+    let edges: Vec<[u32; 2]> = (0..NODES).map(|node| [node, (node + 1) % NODES]).collect();
+    let topology = Topology::new(&positions, Vec::new(), &edges, true).expect("its own nodes");
+    let smaller: Vec<Vec3> = positions.iter().map(|position| 0.9 * position).collect();
+    let mesh = Mesh::new(Arc::new(topology), &smaller, &[0.1; NODES as usize], 0.1);
+    let mut mesh = mesh.expect("a mass each");
+    mesh.set_velocity(-Vec3::ZERO);
+    let springs = MassSpring::new(1.0, 0.0, 1).expect("allowed");
+    let springs = springs.with_center_stiffness(2.0).expect("allowed");
+    Object::new(ObjectId(id), Group(0), Geometry::Mesh(mesh), springs)
+}
+
+/// A sum of nothing but zeros is +0 or −0, by where it begins and what else is added.
+#[test]
+fn flat_bodies_beside_others() {
+    let rings = || {
+        let one = ring(0);
+        let mesh = one.geometry.as_mesh().expect("a body").clone();
+        let like_it = |id| {
+            let mut other = ring(id);
+            // Only bodies of one topology are side by side.
+            other.geometry = Geometry::Mesh(mesh.clone());
+            other
+        };
+        (0..16).map(like_it).collect::<Vec<_>>()
+    };
+    let stages = |simd| Stages { gravity: -Vec3::ZERO, ..stages(simd) };
+    let expected = outcome(rings(), stages(Simd::detect()), 1);
+    for simd in available() {
+        let objects = outcome(rings(), stages(simd), 16);
+        let name = simd.instructions().name();
+        assert!(objects.iter().map(bits).eq(expected.iter().map(bits)), "{name}");
+    }
+}
+
 #[test]
 fn a_limit_on_time_changes_nothing_else() {
     let budget = Some(Duration::from_secs(3_600));

@@ -339,7 +339,8 @@ fn pull_to_center<A: Arithmetic<Lanes: Columns>, L: Law<A>>(
 }
 
 /// The sum over a body's nodes in the order in which a body by itself takes it: over every
-/// [`LANES`]th node, then these sums as in [`fold`].
+/// [`LANES`]th node, then these sums as in [`fold`]. Where all are −0 it is −0, and that one is +0; nothing that is
+/// computed with it shows which.
 ///
 /// [`fold`]: crate::simd::fold
 #[inline(always)]
@@ -357,8 +358,7 @@ fn sum<A: Arithmetic, T>(isa: A, nodes: &[T], of: fn(&T) -> &[A::Lanes; 3]) -> [
         }
         half /= 2;
     }
-    // The other order begins with 0, which makes +0 of −0.
-    plus(isa, sums[0], zero)
+    sums[0]
 }
 
 /// The sum over every [`LANES`]th node from the first given on.
