@@ -112,16 +112,18 @@ impl Anchors {
         self.grips.retain(|grip| grip.by != by);
     }
 
-    /// Makes the frame's list, for `substeps` of so much `time` and nodes of these inverse masses.
-    pub(super) fn begin(&mut self, inverse_masses: &[f32], time: f32, substeps: u32) {
+    /// Makes the frame's list, for `substeps` of so much `time` and nodes of these inverse masses, whose positions count
+    /// from `origin`.
+    pub(super) fn begin(&mut self, inverse_masses: &[f32], origin: Vec3, time: f32, substeps: u32) {
         let anchor = |node: u32, [from, to]: [Vec3; 2], stiffness: f32, strength: f32| {
             let inverse_mass = inverse_masses[node as usize];
             let compliance = 1.0 / (stiffness * time * time);
             Anchor {
                 node,
-                target: from.extend(0.0).to_array(),
+                target: (from - origin).extend(0.0).to_array(),
                 step: ((to - from) / substeps as f32).extend(0.0).to_array(),
-                gain: 1.0 / (inverse_mass + compliance),
+                // What is held fast already needs no anchor, and gives way to none.
+                gain: if inverse_mass > 0.0 { 1.0 / (inverse_mass + compliance) } else { 0.0 },
                 most: strength * (time * time),
                 sum: [0.0; 4],
                 beyond: 0,

@@ -299,8 +299,8 @@ impl Behavior for Tissue {
         input.apply_contacts(mesh);
         let time = input.time_step / self.substeps as f32;
         self.fit(time, mesh);
-        self.anchors.begin(mesh.inverse_masses(), time, self.substeps);
         self.nodes.load(mesh);
+        self.anchors.begin(mesh.inverse_masses(), self.nodes.origin(), time, self.substeps);
         let gravity = if self.weightless { Vec3::ZERO } else { input.gravity };
         let compliance = 1.0 / (self.material.to_center * time * time);
         let is_solid = mesh.topology().center_rest().is_some();
