@@ -36,8 +36,11 @@ impl<M> LetterSlot<M> {
         }
     }
 
-    fn rank(&self) -> (u32, u32) {
-        (self.sender.load(site::SLOT_FIELD), self.sequence.load(site::SLOT_FIELD))
+    fn from(&self) -> From {
+        From {
+            sender: self.sender.load(site::SLOT_FIELD),
+            sequence: self.sequence.load(site::SLOT_FIELD),
+        }
     }
 }
 
@@ -47,13 +50,27 @@ impl<M> Default for LetterSlot<M> {
     }
 }
 
-/// Whose letter it is, and which of theirs: the order in which a receiver processes letters.
+/// Whose letter it is, and which of theirs: the order in which a receiver processes letters, by senders and then as
+/// [`From::is_before`] has them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct From {
     /// The sender's number, chosen by the host.
     pub sender: u32,
-    /// Counts the sender's letters of a frame; one from outside, who cannot know the frame, counts all of its letters.
+    /// Counts the sender's letters of a frame; one from outside, who cannot know the frame, counts all of its letters. It
+    /// may wrap: of two letters at a distance below 2^31 the earlier is the first.
     pub sequence: u32,
+}
+
+impl From {
+    /// Whether a receiver of both processes this letter before `other`. The derived order is another one where a
+    /// sender's count wraps between them.
+    pub fn is_before(self, other: Self) -> bool {
+        if self.sender == other.sender {
+            Frame(self.sequence).is_before(Frame(other.sequence))
+        } else {
+            self.sender < other.sender
+        }
+    }
 }
 
 /// A letter that did not fit, back as it was.
@@ -177,13 +194,15 @@ impl<'m, M: Send + Sync> Post<'m, M> {
                     slot.next.store(to, site::LIST_LINK);
                 }
             },
-            |a, b| self.slot(a).map(LetterSlot::rank) < self.slot(b).map(LetterSlot::rank),
+            |a, b| {
+                self.slot(a).zip(self.slot(b)).is_some_and(|(a, b)| a.from().is_before(b.from()))
+            },
         );
         Mail { post: self, next }
     }
 }
 
-/// Letters in the order of (sender, sequence). Those that are not taken are dropped with it.
+/// Letters in order. Those that are not taken are dropped with it.
 #[derive(Debug)]
 pub struct Mail<'p, 'm, M: Send + Sync> {
     post: &'p Post<'m, M>,
@@ -196,7 +215,7 @@ impl<M: Send + Sync> Iterator for Mail<'_, '_, M> {
     fn next(&mut self) -> Option<Self::Item> {
         while let Some(slot) = self.post.slot(self.next) {
             let index = self.next;
-            let (sender, sequence) = slot.rank();
+            let from = slot.from();
             self.next = slot.next.load(site::LIST_FOLLOW);
             // SAFETY: `collect` took the letter out of the inbox, so this reader has it alone
             // until the push below gives the slot back.
@@ -204,7 +223,7 @@ impl<M: Send + Sync> Iterator for Mail<'_, '_, M> {
             // Refused only if it were no letter of this pool's.
             let _ours = self.post.free.push(index);
             if let Some(message) = message {
-                return Some((From { sender, sequence }, message));
+                return Some((from, message));
             }
         }
         None
@@ -241,5 +260,26 @@ mod tests {
             let next = post.collect(&inbox, frame.next().next());
             assert!(next.eq([(from(0, 0), 9)]), "what was posted in a frame stays for the next");
         }
+    }
+
+    #[test]
+    fn letters_of_one_sender_stay_in_order_when_its_count_wraps() {
+        let mut slots = [const { LetterSlot::new() }; 6];
+        let mut queue = [const { QueueSlot::new() }; 8];
+        let post = Post::new(&mut slots, &mut queue).unwrap_or_else(|full| panic!("{full}"));
+        // SAFETY: there is one pool.
+        let inbox = unsafe { Inbox::new() };
+        let posted = [u32::MAX - 1, u32::MAX, 0, 1];
+        for sequence in posted {
+            for sender in [7, 3] {
+                let from = From { sender, sequence };
+                let _full_at_last = post.post(&inbox, Frame(0), from, ());
+            }
+        }
+        let collected =
+            post.collect(&inbox, Frame(1)).map(|(from, ())| (from.sender, from.sequence));
+        let of_3 = posted[..3].iter().map(|&sequence| (3, sequence));
+        let of_7 = posted[..3].iter().map(|&sequence| (7, sequence));
+        assert!(collected.eq(of_3.chain(of_7)));
     }
 }
