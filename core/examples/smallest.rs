@@ -13,6 +13,7 @@ use dualframe_core::ring::QueueSlot;
 use dualframe_core::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
 use dualframe_core::unit::UnitId;
 use dualframe_core::wait::Spin;
+use dualframe_core::worker::Step;
 
 /// Bodies closer than this push each other, in metres.
 const REACH: f32 = 1.0;
@@ -98,11 +99,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             worker.hold(token).map_err(drop).expect("this pipeline's token");
         }
         while !pipeline.finished() {
-            // A panic would leave the other thread waiting for what this one had in hand.
-            worker.step(&Line).unwrap_or_else(|full| {
-                eprintln!("{full}");
-                std::process::exit(1)
-            });
+            match worker.step(&Line) {
+                Ok(Step::Worked(_)) => {}
+                Ok(Step::Idle) => worker.wait(),
+                // The frame goes on without what did not fit: nobody waits for it.
+                Err(full) => eprintln!("{full}"),
+            }
         }
     };
     let token = pipeline.token(Vec::new()).map_err(|(_, full)| full)?;

@@ -10,8 +10,27 @@
 //! that a compare-and-swap is retried when another worker succeeded at the same word meanwhile. A worker
 //! that is suspended anywhere holds back only the work unit in its hand, what it carries (64 others at
 //! most, and the shared renderer while it has it) and calls for what it has queued in this step; in a swap it
-//! carries nothing and owes no call. Every queue stays usable. A full table is a returned error
+//! carries nothing and owes no call. One that is suspended while it waits may also hold back the call that it was
+//! woken by, and so the work unit that this was for, until another looks: workers that wait on one bell had better have
+//! like priorities, and none may be deleted there. Every queue stays usable. A full table is a returned error
 //! that names the capacity needed. Waiting is the host's ([`wait::Waiting`]).
+//!
+//! | call | guarantee | in an interrupt |
+//! |---|---|---|
+//! | [`latest::Writer::publish`], [`latest::Reader::read`] | wait-free where the target adds in one instruction; a value copied | yes |
+//! | [`pipeline::Pipeline::finished`], [`frame`](pipeline::Pipeline::frame) | wait-free: a load | yes |
+//! | [`pipeline::Pipeline::post`] | lock-free; rings nobody; a letter of an earlier pipeline in the same memory is dropped | yes |
+//! | [`pipeline::Pipeline::token`], [`storage::Static::take`] | lock-free | yes |
+//! | [`worker::Worker::step`], dropping one | lock-free beside the callbacks; calls [`wait::Waiting::wake`] | if that and the callbacks may be |
+//! | the step that opens a frame; with [`frame::Entry::AfterSwap`] the one that swaps | takes up every unit once | as any step |
+//! | [`worker::Worker::wait`] | the host's | no |
+//!
+//! # Targets
+//!
+//! Any with compare-and-swap on words of 32 bits or more; for others there is the feature `portable-atomic`, by which every
+//! exchange is a critical section (README.md, "Embedding the core", says what that crate is to be told). Where adding
+//! to a word takes a loop (Armv7-M, Armv8.0 without LSE), or a critical section, what is wait-free elsewhere is
+//! lock-free or waits for that.
 //!
 //! # One idea
 //!
@@ -40,6 +59,9 @@
 
 #[cfg(target_pointer_width = "16")]
 compile_error!("units and slots are numbered by 32 bits, and an index has to hold their numbers");
+
+#[cfg(not(any(target_has_atomic = "ptr", feature = "portable-atomic", loom)))]
+compile_error!("this target has no compare-and-swap: turn on the feature `portable-atomic`");
 
 #[cfg(all(test, not(loom)))]
 extern crate std;
@@ -70,6 +92,8 @@ mod protocol;
 pub mod ring;
 pub mod stage;
 pub mod storage;
+// For the models, which name every access; hosts have no use for it.
+#[doc(hidden)]
 pub mod sync;
 mod tables;
 pub mod token;

@@ -9,6 +9,7 @@ use crate::sync::{Atomic, CachePadded, Cell, const_fn, seeded, site};
 /// be neither cloned nor built elsewhere, so it cannot be forged or doubled. It may move from
 /// worker to worker, and the renderer moves along. One that is forgotten (`mem::forget`) is never given back.
 #[derive(Debug)]
+#[must_use = "dropping it drops the renderer"]
 pub struct Token<'p, R> {
     renderer: R,
     permit: Permit<'p>,
@@ -30,6 +31,7 @@ impl<'p, R> Token<'p, R> {
     }
 
     /// Gives the token up and the graphics context back.
+    #[must_use = "dropping it drops the renderer"]
     pub fn into_renderer(self) -> R {
         self.renderer
     }
