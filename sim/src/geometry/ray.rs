@@ -68,10 +68,21 @@ fn cast_mesh(mesh: &Mesh, ray: &Ray, reach: f32) -> Option<f32> {
 /// Where a ray enters a box and where it leaves it, in metres along it; `None` if it misses the box or
 /// does not come so far.
 fn crossed(bounds: &Bounds, origin: Vec3, direction: Vec3, reach: f32) -> Option<[f32; 2]> {
-    let inverse = direction.recip();
-    let (to_min, to_max) = ((bounds.min - origin) * inverse, (bounds.max - origin) * inverse);
-    let begin = to_min.min(to_max).max_element().max(0.0);
-    let end = to_min.max(to_max).min_element().min(reach);
+    let (mut begin, mut end) = (0.0, reach);
+    for axis in 0..3 {
+        let (min, max) = (bounds.min[axis], bounds.max[axis]);
+        if direction[axis] == 0.0 {
+            // In the plane of a side, its distance times infinity would be no number.
+            if !(min..=max).contains(&origin[axis]) {
+                return None;
+            }
+        } else {
+            let inverse = 1.0 / direction[axis];
+            let [to_min, to_max] = [min, max].map(|side| (side - origin[axis]) * inverse);
+            begin = to_min.min(to_max).max(begin);
+            end = to_min.max(to_max).min(end);
+        }
+    }
     (begin <= end).then_some([begin, end])
 }
 
@@ -121,6 +132,20 @@ mod tests {
                 assert_eq!(ball.cast(origin + aside, direction, 1.0), None);
             }
         }
+    }
+
+    #[test]
+    fn a_ray_along_a_side_of_the_box_meets_what_is_there() {
+        let places = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
+        let triangles = vec![[0, 1, 2], [0, 2, 3]];
+        let topology = Topology::new(&places, triangles, &[], false).expect("a square");
+        let mesh = Mesh::new(Arc::new(topology), &places, &[1.0; 4], 0.0).expect("a square");
+        let square = Geometry::Mesh(mesh);
+        for aside in [0.0, 1.0] {
+            let hit = square.cast(Vec3::new(aside, 0.5, 1.0), Vec3::NEG_Z, 2.0);
+            assert_eq!(hit, Some(1.0), "{aside}");
+        }
+        assert_eq!(square.cast(Vec3::new(-0.1, 0.5, 1.0), Vec3::NEG_Z, 2.0), None);
     }
 
     #[test]
