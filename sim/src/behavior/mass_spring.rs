@@ -39,6 +39,9 @@ pub enum MassSpringError {
 /// Every force is central and comes with its opposite, so linear and angular momentum are kept up to
 /// rounding. The force of a spring to the centre is taken up by all nodes in equal shares: the centre
 /// is their mean, not a node.
+///
+/// A place moves by v·h in each substep, and no finer than its last digit: at 3 m (2.4e-7 m) and 1,000 substeps at 240
+/// frames a second what is slower than 0.03 m/s stays where it is, at the usual 10 what is slower than 0.0003 m/s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MassSpring {
     stiffness: f32,

@@ -31,6 +31,12 @@ pub enum ScriptError {
         /// The position of the keyframe in the list.
         index: usize,
     },
+    /// A keyframe is nowhere, or turned in no way.
+    #[error("the position of keyframe {index} is not finite, or its rotation no unit quaternion")]
+    Pose {
+        /// The position of the keyframe in the list.
+        index: usize,
+    },
 }
 
 /// A path as a function of the frame: straight lines between keyframes, at rest before the first and
@@ -45,10 +51,15 @@ impl Scripted {
     /// A path through the keyframes.
     ///
     /// # Errors
-    /// No keyframe at all, or keyframes whose frames do not ascend.
+    /// No keyframe at all, keyframes whose frames do not ascend, a position that is not finite, or a rotation that is no
+    /// unit quaternion.
     pub fn new(keyframes: Vec<Keyframe>) -> Result<Self, ScriptError> {
         if keyframes.is_empty() {
             return Err(ScriptError::Empty);
+        }
+        let is_pose = |key: &Keyframe| key.position.is_finite() && key.rotation.is_normalized();
+        if let Some(index) = keyframes.iter().position(|key| !is_pose(key)) {
+            return Err(ScriptError::Pose { index });
         }
         let late = keyframes.windows(2).position(|pair| pair[0].frame >= pair[1].frame);
         match late {
@@ -93,5 +104,22 @@ impl Behavior for Scripted {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_pose_is_refused() {
+        let right = Keyframe { frame: 3, position: Vec3::ONE, rotation: Quat::IDENTITY };
+        let nowhere = Keyframe { frame: 4, position: Vec3::X * f32::NAN, ..right };
+        let unturned =
+            Keyframe { frame: 4, rotation: Quat::from_xyzw(0.0, 0.0, 0.0, 0.0), ..right };
+        for wrong in [nowhere, unturned] {
+            assert_eq!(Scripted::new(vec![right, wrong]), Err(ScriptError::Pose { index: 1 }));
+        }
+        assert!(Scripted::new(vec![right]).is_ok());
     }
 }

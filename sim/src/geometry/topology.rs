@@ -25,6 +25,12 @@ pub enum TopologyError {
         /// The number of nodes of the body.
         nodes: usize,
     },
+    /// A node is nowhere, or so far from others that what joins them has no finite length.
+    #[error("the position of node {node} is not finite, or too far from others for springs")]
+    Position {
+        /// The node.
+        node: u32,
+    },
     /// A spring joins a node to itself.
     #[error("a spring joins node {node} to itself")]
     Loop {
@@ -77,8 +83,8 @@ impl Topology {
     /// `to_center` says so, by one spring from each node to the mean of all nodes.
     ///
     /// # Errors
-    /// A triangle or an edge that names a node past the last, an edge from a node to itself, or more
-    /// than [`Topology::MAX_NODES`] nodes.
+    /// A triangle or an edge that names a node past the last, an edge from a node to itself, a position that is not
+    /// finite or so far away that a spring's length is not, or more than [`Topology::MAX_NODES`] nodes.
     pub fn new(
         positions: &[Vec3],
         triangles: Vec<[u32; 3]>,
@@ -99,8 +105,16 @@ impl Topology {
         let length = |[a, b]: [u32; 2]| (positions[a as usize] - positions[b as usize]).length();
         let springs: Vec<Spring> =
             edges.iter().map(|&nodes| Spring { nodes, rest: length(nodes) }).collect();
-        let (slots, first_slot) = neighbour_table(nodes, &springs);
         let center_rest = to_center.then(|| distances_to_mean(positions));
+        let nowhere = positions.iter().position(|position| !position.is_finite());
+        let endless = springs.iter().find(|spring| !spring.rest.is_finite());
+        let distances = center_rest.as_deref().unwrap_or_default().as_flattened();
+        let far = distances.iter().position(|distance| !distance.is_finite());
+        let node = nowhere.or(far).map(|node| node as u32);
+        if let Some(node) = node.or(endless.map(|spring| spring.nodes[0])) {
+            return Err(TopologyError::Position { node });
+        }
+        let (slots, first_slot) = neighbour_table(nodes, &springs);
         let present = in_lanes(std::iter::repeat_n(1.0, nodes), nodes);
         Ok(Self { nodes, triangles, springs, slots, first_slot, center_rest, present })
     }
@@ -189,4 +203,27 @@ fn neighbour_table(nodes: usize, springs: &[Spring]) -> (Vec<Slot>, Vec<usize>) 
 fn distances_to_mean(positions: &[Vec3]) -> Vec<Lanes> {
     let mean = positions.iter().copied().sum::<Vec3>() / positions.len().max(1) as f32;
     in_lanes(positions.iter().map(|&position| (position - mean).length()), positions.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_no_length_is_refused() {
+        let refused = |places: &[Vec3], to_center| {
+            Topology::new(places, Vec::new(), &[[0, 1]], to_center).expect_err("too far")
+        };
+        for (places, to_center, node) in [
+            ([Vec3::ZERO, Vec3::X * f32::NAN], false, 1),
+            ([Vec3::Y * f32::INFINITY, Vec3::ZERO], true, 0),
+            ([Vec3::ZERO, Vec3::splat(1e30)], false, 0),
+        ] {
+            assert_eq!(refused(&places, to_center), TopologyError::Position { node }, "{places:?}");
+        }
+        let far = [Vec3::ZERO, Vec3::splat(1e30)];
+        let to_center = Topology::new(&far, Vec::new(), &[], true);
+        assert_eq!(to_center, Err(TopologyError::Position { node: 0 }));
+        assert!(Topology::new(&far, Vec::new(), &[], false).is_ok());
+    }
 }

@@ -94,7 +94,9 @@ mod tests {
             Vec3::new(8e-3 + 1e-4 * node as f32, 9.1e-3, SURFACE + height)
         };
         let places: Vec<Vec3> = heights.iter().enumerate().map(place).collect();
-        let topology = Topology::new(&places, Vec::new(), &[], false).expect("some nodes");
+        // At rest they are somewhere, wherever they have gone since.
+        let rest = vec![Vec3::ZERO; places.len()];
+        let topology = Topology::new(&rest, Vec::new(), &[], false).expect("some nodes");
         let masses = vec![1e-3; places.len()];
         let mesh = Mesh::new(Arc::new(topology), &places, &masses, radius).expect("as many masses");
         Object::new(ObjectId(0), Group(0), Geometry::Mesh(mesh), Fixed)

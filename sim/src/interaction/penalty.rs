@@ -15,9 +15,10 @@ use crate::object::Object;
 ///
 /// Where two bodies touch as wholes ([`Contact::BODY`] on both sides) only the spring acts, without damping and friction.
 ///
-/// The force is that of the frame's beginning: with a node's mass m (kg) and the time step t (s) a node was thrown by none
-/// (measured with single ones) while stiffness · t² / m was below 2 and damping · t / m below 1.5; without damping it may
-/// bounce a third higher than it fell from 0.5 on.
+/// The force is that of the frame's beginning: with a node's mass m (kg) and the time step t (s) a node is first pushed at
+/// up to its speed times t deep, and leaves at up to stiffness · t² / m + damping · t / m − 1 times that speed. So it is
+/// thrown by none while that sum is below 2. Without damping each bounce may be a third higher than the fall from
+/// stiffness · t² / m = 0.5 on.
 ///
 /// Between nodes the force acts along the line of their centres on both alike, so without friction
 /// linear and angular momentum are kept up to rounding.

@@ -84,10 +84,11 @@ pub(super) fn free_piece(object: &Object) -> Option<(&Piece, &Volume)> {
 /// Coulomb's friction and without rebound; a point that is inside already is let out slowly.
 ///
 /// They are found by sequential impulses (E. Catto, "Iterative dynamics with temporal coherence", GDC
-/// 2005) from the velocity that the piece has with what gravity and hands will do to it.
+/// 2005) from the velocity that the piece has with what gravity and hands will do to it. Each bone finds them as if it were
+/// the only one: a piece that lies on two is held off twice, and may be thrown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PieceOnBone {
-    /// The coefficient of friction; usually 0.4.
+    /// The coefficient of friction; usually 0.4. What is negative or no number is none.
     pub friction: f32,
 }
 
@@ -202,7 +203,7 @@ impl Point {
         let slip = velocity - self.normal * velocity.dot(self.normal);
         // A piece that stands on its edge turns far more easily than it is pushed down.
         let mass = motion.mass(self.place, slip.normalize_or_zero());
-        let rubbed = (self.rubbed - slip * mass).clamp_length_max(friction * self.pressed);
+        let rubbed = (self.rubbed - slip * mass).clamp_length_max(friction.max(0.0) * self.pressed);
         motion.push(rubbed - self.rubbed, self.place);
         self.rubbed = rubbed;
     }
