@@ -21,9 +21,10 @@ const ROUND_COLUMNS: [&str; 10] = [
 ];
 
 /// The columns of [`Outcome::add_summary`].
-const SUMMARY_COLUMNS: [&str; 17] = [
+const SUMMARY_COLUMNS: [&str; 18] = [
     "objects",
     "load",
+    "render_share",
     "executor",
     "threads",
     "which_rounds",
@@ -84,6 +85,17 @@ impl Outcome {
         Some(self.speed_up(self.series.best_rounds(), runner, over)?.median)
     }
 
+    /// What share of the serial version's work rendering is, if `without` is the same race without it: by the medians of
+    /// what it takes in the good rounds of either, or in all where none is good.
+    #[must_use]
+    pub fn render_share(&self, without: &Self) -> Option<f64> {
+        let seconds = |outcome: &Self| {
+            let serial = outcome.index(Runner::SERIAL)?;
+            Some(outcome.series.seconds(outcome.series.best_rounds(), serial)?.median)
+        };
+        Some(1.0 - seconds(without)? / seconds(self)?)
+    }
+
     /// Adds a row for each runner and round.
     pub fn add_rounds(&self, table: &mut Table) {
         let Race { subject, load, frames, .. } = &self.race;
@@ -107,13 +119,15 @@ impl Outcome {
         }
     }
 
-    /// Adds two rows for each runner: over all rounds, and over the good ones if there are any.
-    pub fn add_summary(&self, table: &mut Table) {
+    /// Adds two rows for each runner: over all rounds, and over the good ones if there are any. `without` is the same
+    /// race without rendering, this one if it has none.
+    pub fn add_summary(&self, without: &Self, table: &mut Table) {
+        let share = self.render_share(without);
         let all = self.series.rounds().len();
         let good = all - self.series.marked();
         for (which, name, count) in [(Rounds::All, "all", all), (Rounds::Good, "good", good)] {
             for &runner in &self.runners {
-                self.add_summary_row(table, runner, (which, name, count));
+                self.add_summary_row(table, share, runner, (which, name, count));
             }
         }
     }
@@ -121,6 +135,7 @@ impl Outcome {
     fn add_summary_row(
         &self,
         table: &mut Table,
+        share: Option<f64>,
         runner: Runner,
         (which, name, count): (Rounds, &str, usize),
     ) {
@@ -134,6 +149,7 @@ impl Outcome {
         table.push(&[
             &self.race.subject.objects(),
             &self.race.load.name(),
+            &cell(share),
             &runner.executor.name(),
             &runner.threads,
             &name,
@@ -237,14 +253,23 @@ pub(super) mod tests {
         let third = ["4", "null", "pipeline", "2", "0", "2.500000", "40.00", "2.000", "100.0", "0"];
         assert_eq!(table.rows[2], third);
         let mut table = Outcome::summary_table("summary");
-        outcome.add_summary(&mut table);
+        outcome.add_summary(&outcome, &mut table);
         let row = &table.rows[2];
-        assert_eq!(
-            row[..10],
-            ["4", "null", "pipeline", "2", "all", "3", "2.500000", "2.500000", "2.500000", "40.00"]
-        );
+        assert_eq!(row[..7], ["4", "null", "0.0000", "pipeline", "2", "all", "3"]);
+        assert_eq!(row[7..11], ["2.500000", "2.500000", "2.500000", "40.00"]);
         let ratios = ["2.4000", "2.4000", "2.4000", "1.6000", "1.6000", "1.6000", "0.8000"];
-        assert_eq!(row[10..], ratios, "S_s, S_p and E_p");
+        assert_eq!(row[11..], ratios, "S_s, S_p and E_p");
+    }
+
+    #[test]
+    fn the_share_of_rendering_is_what_the_serial_version_takes_longer() {
+        let one = Runner::pipeline(1);
+        let without = outcome(1, &[(one, 1.0), (Runner::SERIAL, 3.0)], &[2.0; 4]);
+        let with = outcome(1, &[(Runner::SERIAL, 4.0), (one, 9.0)], &[2.0; 4]);
+        assert_eq!(with.render_share(&without), Some(0.25));
+        assert_eq!(without.render_share(&without), Some(0.0));
+        let unknown = outcome(1, &[(one, 1.0)], &[2.0; 4]);
+        assert_eq!(with.render_share(&unknown), None);
     }
 
     #[test]
