@@ -49,12 +49,12 @@ fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
             let (s_s, s_p) = (over(Runner::SERIAL), over(one));
             // The lowest of the medians: a minimum within each round would favour whichever
             // executor happened to be undisturbed.
-            let fastest = others.iter().map(|&other| over(other)).fold(f64::INFINITY, f64::min);
+            let least = others.iter().map(|&other| over(other)).fold(f64::INFINITY, f64::min);
             let gains: Result<Vec<f64>, _> =
                 (0..GAIN_ROUNDS).map(|_| race.independent_gain(arguments.threads)).collect();
             let ceiling = Quartiles::of(gains?).map_or(f64::NAN, |gains| gains.median);
             let mut line = format!(
-                "{objects:7}  {share:6.1} %  {ceiling:7.3}  {s_s:5.3}  {:5.3}  {fastest:7.3}",
+                "{objects:7}  {share:6.1} %  {ceiling:7.3}  {s_s:5.3}  {:5.3}  {least:5.3}",
                 efficiency(s_p, arguments.threads)
             );
             for &other in &others {
@@ -67,11 +67,12 @@ fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
         others.iter().map(|other| format!("  {:>16}", other.executor.name())).collect();
     println!(
         "\n{}: medians over good rounds (all if none is good); ceiling: what {} independent environments gain, \
-         the median of {GAIN_ROUNDS} measurements after the race, disturbed ones too",
+         the median of {GAIN_ROUNDS} measurements after the race, disturbed ones too; least: over the one that it is least \
+         ahead of",
         pipeline.label(),
         arguments.threads
     );
-    println!("objects  render    ceiling    S_s    E_p  fastest{names}");
+    println!("objects  render    ceiling    S_s    E_p  least{names}");
     lines.iter().for_each(|line| println!("{line}"));
     Ok(())
 }
