@@ -6,6 +6,7 @@ use super::error::ExperimentError;
 use super::figure::{Chart, Figure};
 use super::race::Runner;
 use super::scalability::range;
+use super::statistics::rounded_up;
 use super::subject::Subject;
 use super::table::Table;
 use super::timing::{Contender, Rounds, Series};
@@ -188,9 +189,9 @@ fn figure(balances: &[Balance], frames: u64) -> Result<Figure, ExperimentError> 
         x_label: "objects",
         y_label: "seconds",
         finding: format!(
-            "The busiest and the idlest worker differ by at most {:.1} %. Of each size one run is shown, {USUAL}, the \
+            "In the runs shown, the busiest and the idlest worker differ by at most {:.1} %. Of each size one run is shown, {USUAL}, the \
              workers from left to right; stages have the shares that they have in one frame of 31. {}",
-            100.0 * greatest,
+            rounded_up(100.0 * greatest, 1),
             marked(balances)
         ),
         paper: "Very balanced in all cases: within 0.4 % for 500 objects (Table 1: 12.15 to 12.20 s).",
@@ -231,5 +232,14 @@ mod tests {
         let lost = balance(&[0.3, 0.1, 0.2], &[1.0; 4]);
         assert_eq!(lost.usual(), 2);
         assert_eq!(marked(&[lost]), "3 of 3 runs were marked as disturbed; 1 of the 1 shown are.");
+    }
+    #[test]
+    fn a_figure_says_how_far_workers_differ_at_most() {
+        let balances = [balance(&[0.3, 0.0001, 0.00141], &[]), balance(&[0.0005], &[])];
+        let finding = figure(&balances, 40).expect("it is drawn").finding;
+        let expected =
+            "In the runs shown, the busiest and the idlest worker differ by at most 0.2 %. ";
+        assert!(finding.starts_with(expected), "{finding}");
+        assert!(finding.ends_with(&marked(&balances)), "{finding}");
     }
 }

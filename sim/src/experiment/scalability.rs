@@ -6,6 +6,7 @@ use super::load::RenderLoad;
 use super::outcome::{Outcome, marked};
 use super::race::{Race, Runner, WARM_UP};
 use super::speedup::efficiency;
+use super::statistics::rounded_down;
 use super::subject::Subject;
 use super::{Laboratory, Report};
 use crate::scene::ParticleScene;
@@ -131,7 +132,11 @@ fn efficiencies(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Exper
         title: "Thread efficiency".to_owned(),
         x_label: "objects",
         y_label: "efficiency E_p = S_p / p",
-        finding: format!("The efficiency is at least {least:.3}. {}", marked(outcomes)),
+        finding: format!(
+            "The efficiency is at least {:.3}. {}",
+            rounded_down(least, 3),
+            marked(outcomes)
+        ),
         paper: "Greater than 0.89 in all cases, up to 6 threads and 1,000 objects (§8.1, Fig. 13).",
         ..Chart::default()
     }
@@ -182,5 +187,13 @@ mod tests {
         assert_eq!(finding(speed_ups(&outcomes, &[1, 2])), expected);
         let expected = format!("The efficiency is at least 0.800. {none}");
         assert_eq!(finding(efficiencies(&outcomes, &[1, 2])), expected);
+    }
+
+    #[test]
+    fn the_least_efficiency_is_not_rounded_up() {
+        let seconds = [(Runner::pipeline(1), 1.7792), (Runner::pipeline(2), 1.0)];
+        let figure = efficiencies(&[outcome(100, &seconds, &[2.0; 4])], &[1, 2]);
+        let finding = figure.expect("it is drawn").finding;
+        assert!(finding.starts_with("The efficiency is at least 0.889. "), "{finding}");
     }
 }

@@ -37,9 +37,29 @@ pub fn variance(values: &[f64]) -> f64 {
     values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count
 }
 
+/// A value with so many decimals that it is not above the given one: what "at least" may be said of.
+pub(super) fn rounded_down(value: f64, decimals: i32) -> f64 {
+    let scale = 10.0_f64.powi(decimals);
+    (value * scale).floor() / scale
+}
+
+/// A value with so many decimals that it is not below the given one: what "at most" may be said of.
+pub(super) fn rounded_up(value: f64, decimals: i32) -> f64 {
+    -rounded_down(-value, decimals)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bounds_stay_bounds() {
+        assert_eq!(
+            [0.8896, 0.889, -0.8896].map(|value| rounded_down(value, 3)),
+            [0.889, 0.889, -0.89]
+        );
+        assert_eq!([0.141, 0.1, -0.141].map(|value| rounded_up(value, 1)), [0.2, 0.1, -0.1]);
+    }
 
     #[test]
     fn quartiles() {
