@@ -12,6 +12,7 @@ use dualframe_sim::experiment::subject::Subject;
 use dualframe_sim::experiment::{Experiment, Findings, PAGE, run};
 use dualframe_sim::manager::VeManager;
 use dualframe_sim::render::NullRenderer;
+use dualframe_sim::scene::ParticleScene;
 use dualframe_sim::scene::craniotomy::{OBJECTS, TOOLS};
 use glam::Vec3;
 
@@ -34,8 +35,9 @@ fn all_experiments() {
     let plan = tiny();
     let mut work = 0;
     let found = run(&Experiment::ALL, &plan, out.path(), &mut |_, done| work += done);
-    let Findings { reports, written } = found.expect("tiny experiments run");
+    let Findings { reports, written, ended } = found.expect("the plan is sound");
     written.expect("the folder takes them");
+    ended.expect("tiny experiments run");
     let all: u64 = Experiment::ALL.iter().map(|experiment| experiment.work(&plan)).sum();
     assert_eq!(work, all, "progress ends where it should");
 
@@ -95,13 +97,27 @@ fn a_file_that_cannot_be_written_costs_no_other() {
     fs::create_dir(out.path().join("fig15-collisions.svg")).expect("a folder");
     let experiments = [Experiment::PerFrame, Experiment::Compare];
     let found = run(&experiments, &tiny(), out.path(), &mut |_, _| ());
-    let Findings { reports, written } = found.expect("tiny experiments run");
+    let Findings { reports, written, ended } = found.expect("the plan is sound");
+    ended.expect("tiny experiments run");
     let error = written.expect_err("it cannot be written");
     assert!(error.to_string().contains("fig15-collisions.svg"), "{error}");
     assert_eq!(reports.len(), 2);
     for name in ["fig15-collisions.png", "fig15-speed-up.svg", "compare.csv", PAGE] {
         assert!(out.path().join(name).is_file(), "{name}");
     }
+}
+
+#[test]
+fn an_experiment_that_fails_costs_no_earlier_one() {
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let compare = Sweep { objects: vec![3, ParticleScene::MAX_OBJECTS + 1], ..tiny().compare };
+    let plan = Plan { compare, ..tiny() };
+    let experiments = [Experiment::PerFrame, Experiment::Compare, Experiment::LoadBalance];
+    let found = run(&experiments, &plan, out.path(), &mut |_, _| ());
+    let Findings { reports, written, ended } = found.expect("the first one runs");
+    assert!(matches!(ended, Err(ExperimentError::Scene(_))), "{ended:?}");
+    assert!(written.is_ok() && out.path().join("per-frame.csv").is_file());
+    assert_eq!(reports.len(), 1);
 }
 
 #[test]

@@ -5,18 +5,17 @@ use std::path::Path;
 
 use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::machine::Machine;
-use dualframe_sim::experiment::{self, Findings, PAGE, Report};
+use dualframe_sim::experiment::{self, Findings, PAGE, Report, folder};
 
 use super::args::ExperimentArgs;
 use super::error::RunError;
-use super::outputs::{self, Output, make_folder};
-use super::progress;
+use super::outputs::{self, make_folder};
+use super::{progress, with_causes};
 
-/// Makes the folder and sees that it can be written to: an hour's run must not end in "no such
-/// folder".
+/// Makes the folder and sees that it takes files: an hour's run must not end in "no such folder".
 pub(super) fn prepare(out: &Path) -> Result<(), String> {
     make_folder(out)?;
-    Output::open(&out.join(PAGE)).map(drop)
+    folder::check(out).map_err(|error| with_causes(&error))
 }
 
 /// Runs the experiments that `args` ask for.
@@ -27,9 +26,9 @@ pub(super) fn run(args: &ExperimentArgs) -> Result<Findings, ExperimentError> {
     let findings = experiment::run(&experiments, &plan, &args.out, &mut |experiment, done| {
         bar.set_message(experiment.name());
         bar.inc(done);
-    })?;
+    });
     bar.finish_and_clear();
-    Ok(findings)
+    findings
 }
 
 /// Prints what was found.

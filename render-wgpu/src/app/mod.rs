@@ -59,9 +59,11 @@ fn run_experiments(args: &ExperimentArgs) -> ExitCode {
     }
     let told = Told::default();
     match experiment::run(args) {
-        Ok(Findings { reports, written }) => {
-            told.attempt(experiment::print(&reports, args));
-            if let Err(error) = written {
+        Ok(Findings { reports, written, ended }) => {
+            if !reports.is_empty() {
+                told.attempt(experiment::print(&reports, args));
+            }
+            for error in [written, ended].into_iter().filter_map(Result::err) {
                 told.note(&with_causes(&error));
                 told.end_with(UNSOUND);
             }

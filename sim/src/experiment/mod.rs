@@ -18,6 +18,7 @@ pub mod calibrator;
 mod compare;
 pub mod error;
 pub mod figure;
+pub mod folder;
 pub mod load;
 mod load_balance;
 pub mod machine;
@@ -35,7 +36,6 @@ pub mod timing;
 mod work;
 
 use std::path::Path;
-use std::{fs, io};
 
 use self::calibrator::Calibrator;
 use self::error::ExperimentError;
@@ -157,10 +157,12 @@ pub struct Shown {
 /// What experiments found.
 #[derive(Debug)]
 pub struct Findings {
-    /// One of each experiment, in their order.
+    /// One of each experiment that has ended, in their order.
     pub reports: Vec<Report>,
     /// The first file that could not be written, if any could not.
     pub written: Result<(), ExperimentError>,
+    /// Why the experiment after these could not be run, or its runs were not sound, if so: there is no further one.
+    pub ended: Result<(), ExperimentError>,
 }
 
 /// Runs experiments one after the other and writes into the folder `out`, which must be there: of each
@@ -168,9 +170,11 @@ pub struct Findings {
 /// [`PAGE`] of all that have ended. `progress` is told what is running and how much work was done
 /// since it was told last, in the unit of [`Experiment::work`].
 ///
+/// A file of an earlier run is replaced, the page too: it shows nothing of that one.
+///
 /// # Errors
-/// An experiment cannot be run, its runs were not sound, or there is no such folder. A file that cannot be written costs
-/// no other: see [`Findings::written`].
+/// A plan lacks something, or the folder takes no new files. An experiment that fails costs no earlier one, and a file
+/// that cannot be written no other: see [`Findings`].
 pub fn run(
     experiments: &[Experiment],
     plan: &Plan,
@@ -178,16 +182,13 @@ pub fn run(
     progress: &mut dyn FnMut(Experiment, u64),
 ) -> Result<Findings, ExperimentError> {
     experiments.iter().try_for_each(|experiment| experiment.check(plan))?;
-    if !out.is_dir() {
-        let source = io::ErrorKind::NotADirectory.into();
-        return Err(ExperimentError::Write { path: out.to_owned(), source });
-    }
+    folder::check(out)?;
     let machine = Machine::this();
     let calibrator = Calibrator::default();
     let (mut reports, mut written) = (Vec::new(), Ok(()));
     let mut write = |name: &str, extension: &str, bytes: &[u8]| {
         let path = out.join(name).with_extension(extension);
-        if let Err(source) = fs::write(&path, bytes)
+        if let Err(source) = folder::replace(&path, bytes)
             && written.is_ok()
         {
             written = Err(ExperimentError::Write { path, source });
@@ -196,7 +197,10 @@ pub fn run(
     for &experiment in experiments {
         let mut progress = |work| progress(experiment, work);
         let mut laboratory = Laboratory { plan, calibrator, progress: &mut progress };
-        let report = experiment.run(&mut laboratory)?;
+        let report = match experiment.run(&mut laboratory) {
+            Ok(report) => report,
+            Err(error) => return Ok(Findings { reports, written, ended: Err(error) }),
+        };
         for table in &report.tables {
             write(table.name, "csv", table.csv().as_bytes());
         }
@@ -207,7 +211,7 @@ pub fn run(
         reports.push(report);
         write(PAGE, "html", page::page(&machine, plan, &reports).as_bytes());
     }
-    Ok(Findings { reports, written })
+    Ok(Findings { reports, written, ended: Ok(()) })
 }
 
 /// What experiments are run with.

@@ -68,7 +68,8 @@ pub(in crate::app) struct ExperimentArgs {
     /// What `compare` runs; `all` runs both
     #[arg(long, value_name = "NAME", value_enum)]
     scene: Option<SceneName>,
-    /// The folder to write into, which is made if it is not there.
+    /// The folder to write into, which is made if it is not there. Files of an earlier run are replaced,
+    /// and the page shows the experiments of this run alone.
     #[arg(long, value_name = "DIR")]
     pub(in crate::app) out: PathBuf,
 }
