@@ -111,10 +111,15 @@ impl Chart {
         let scene = render_multiple(plots, layout);
         let png = RasterBackend::new().with_scale(SCALE).render_scene(&scene);
         let png = png.map_err(|reason| ExperimentError::Draw { figure: self.name, reason })?;
-        let svg = SvgBackend.render_scene(&scene);
+        let svg = shrinkable(&SvgBackend.render_scene(&scene), scene.width, scene.height);
         let Self { name, title, finding, paper, .. } = self;
         Ok(Figure { name, title, svg, png, finding, paper })
     }
+}
+
+/// An SVG of so many pixels that is drawn smaller where there are fewer, as on a narrow page, and not cut off.
+fn shrinkable(svg: &str, width: f64, height: f64) -> String {
+    svg.replacen("<svg ", &format!("<svg viewBox=\"0 0 {width} {height}\" "), 1)
 }
 
 fn plot(line: Line) -> Plot {
@@ -160,6 +165,18 @@ mod tests {
             "black is the text's too"
         );
         assert!(colors(&many) <= 1 && many.contains(COLORS[0]) && !many.contains("worker"));
+    }
+
+    #[test]
+    fn a_page_may_shrink_a_figure() {
+        let figure = Chart::default().lines(vec![Line::default()]).expect("it is drawn");
+        let (head, _) = figure.svg.split_once('>').expect("a tag");
+        let size = |name: &str| {
+            let (_, rest) = head.split_once(&format!(" {name}=\"")).expect("it has a size");
+            rest.split_once('"').expect("an end").0
+        };
+        let whole = format!("viewBox=\"0 0 {} {}\"", size("width"), size("height"));
+        assert!(head.contains(&whole), "no {whole} in {head}");
     }
 
     #[test]
