@@ -2,7 +2,7 @@
 
 use kuva::backend::raster::RasterBackend;
 use kuva::backend::svg::SvgBackend;
-use kuva::plot::{BarPlot, LegendPosition, LinePlot};
+use kuva::plot::{BarPlot, LegendPosition, LinePlot, MarkerShape, ScatterPlot};
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 use kuva::render::render::render_multiple;
@@ -11,6 +11,10 @@ use super::error::ExperimentError;
 
 /// Pixels of a PNG for one of the SVG's.
 const SCALE: f32 = 2.0;
+/// Width of a line, in pixels; usually 2.
+const STROKE: f64 = 2.0;
+/// Radius of a point, in pixels; usually 4.
+const POINT: f64 = 4.0;
 /// Colours that are told apart by most people (Okabe and Ito 2008), but yellow, which is pale.
 const COLORS: [&str; 7] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000"];
@@ -123,10 +127,12 @@ fn shrinkable(svg: &str, width: f64, height: f64) -> String {
 }
 
 fn plot(line: Line) -> Plot {
-    let mut plot = LinePlot::new()
-        .with_data(line.points)
-        .with_color(COLORS[line.color % COLORS.len()])
-        .with_stroke_width(2.0);
+    if let [_] = line.points[..] {
+        return point(line);
+    }
+    let color = COLORS[line.color % COLORS.len()];
+    let mut plot =
+        LinePlot::new().with_data(line.points).with_color(color).with_stroke_width(STROKE);
     if !line.label.is_empty() {
         plot = plot.with_legend(line.label);
     }
@@ -136,6 +142,20 @@ fn plot(line: Line) -> Plot {
         (false, false) => plot.with_dotted().into(),
         (false, true) => plot.into(),
     }
+}
+
+/// A line of one point, of which a line would show nothing.
+fn point(line: Line) -> Plot {
+    let color = COLORS[line.color % COLORS.len()];
+    let mut plot = ScatterPlot::new().with_data(line.points).with_color(color).with_size(POINT);
+    if !line.label.is_empty() {
+        plot = plot.with_legend(line.label);
+    }
+    // The second one of this colour.
+    if line.color >= COLORS.len() {
+        plot = plot.with_marker(MarkerShape::Triangle);
+    }
+    plot.into()
 }
 
 #[cfg(test)]
@@ -165,6 +185,27 @@ mod tests {
             "black is the text's too"
         );
         assert!(colors(&many) <= 1 && many.contains(COLORS[0]) && !many.contains("worker"));
+    }
+
+    #[test]
+    fn a_line_of_one_point_is_seen() {
+        let line = |color| Line {
+            label: "line".to_owned(),
+            points: vec![(1.0, 1.0)],
+            color,
+            ..Line::default()
+        };
+        let svg = |color| {
+            let figure = Chart::default().lines(vec![line(color)]);
+            figure.expect("a point is drawn").svg
+        };
+        let [first, second] = [0, COLORS.len()].map(svg);
+        for svg in [&first, &second] {
+            let places = svg.matches(COLORS[0]).count();
+            assert!(places >= 2, "{places}: in the legend and where the point is");
+            assert!(!svg.contains("NaN"), "{svg}");
+        }
+        assert_ne!(first, second, "two of one colour are told apart");
     }
 
     #[test]
