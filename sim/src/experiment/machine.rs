@@ -27,10 +27,11 @@ impl Machine {
     /// This machine.
     #[must_use]
     pub fn this() -> Self {
+        let threads = cores();
         Self {
             processor: processor().unwrap_or_else(|| "unknown processor".to_owned()),
-            threads: cores(),
-            cores: physical_cores(),
+            threads,
+            cores: physical_cores(threads),
             system: std::env::consts::OS,
             architecture: std::env::consts::ARCH,
             instructions: Simd::detect().instructions().name(),
@@ -55,10 +56,11 @@ impl fmt::Display for Machine {
     }
 }
 
-/// How many cores this process may use, as Linux tells: hardware threads that name different siblings. Other systems are
-/// not asked.
-fn physical_cores() -> Option<usize> {
-    let siblings = core_affinity::get_core_ids()?.into_iter().map(|thread| {
+/// How many cores so many hardware threads are of, as Linux tells: those that name different siblings. Other systems are
+/// not asked. Where more of them may be used, but for a share of the time only, as in a container, nobody can say which.
+fn physical_cores(threads: usize) -> Option<usize> {
+    let usable = core_affinity::get_core_ids().filter(|usable| usable.len() == threads)?;
+    let siblings = usable.into_iter().map(|thread| {
         let list =
             format!("/sys/devices/system/cpu/cpu{}/topology/thread_siblings_list", thread.id);
         fs::read_to_string(list).ok()
@@ -84,6 +86,13 @@ mod tests {
         let machine = Machine::this();
         assert!(machine.threads >= 1 && machine.cores != Some(0));
         assert!(machine.to_string().contains(machine.architecture));
+    }
+
+    #[test]
+    fn fewer_hardware_threads_than_there_are_say_nothing_of_cores() {
+        assert_eq!(physical_cores(cores() + 1), None);
+        let threads = core_affinity::get_core_ids().map_or(0, |usable| usable.len());
+        assert!(physical_cores(threads).is_none_or(|cores| (1..=threads).contains(&cores)));
     }
 
     #[test]
