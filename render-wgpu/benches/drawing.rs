@@ -161,7 +161,7 @@ fn executors(arguments: &Arguments, objects: usize) -> Result<(), Box<dyn Error>
         runners.iter().map(contender).collect();
     let calibrator = Calibrator::default();
     let phase = &mut || calibrator.phase();
-    let rounds = if test { 1..=1 } else { until_good(rounds) };
+    let rounds = if test { 1..=1 } else { until_good(rounds, &Machine::this()) };
     let series = Series::measure(&mut contenders, rounds, phase, &mut || ())?;
     let (marked, rounds, which) = (series.marked(), series.rounds().len(), series.best_rounds());
     println!("{objects} objects, every frame drawn, {marked} of {rounds} rounds marked:");

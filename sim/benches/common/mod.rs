@@ -41,7 +41,7 @@ fn at_least_one(most: u64) -> RangedU64ValueParser<usize> {
 impl Arguments {
     /// How many rounds a race has: see [`Race::rounds`](dualframe_sim::experiment::race::Race::rounds).
     pub(crate) fn rounds(&self) -> RangeInclusive<usize> {
-        if self.test { 1..=1 } else { timing::until_good(self.rounds) }
+        if self.test { 1..=1 } else { timing::until_good(self.rounds, &Machine::this()) }
     }
 
     /// Numbers of particles: those asked for, or else `usual`.

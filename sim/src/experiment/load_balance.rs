@@ -168,10 +168,7 @@ fn marked(balances: &[Balance]) -> String {
     let bad: usize = balances.iter().map(|balance| balance.series.marked()).sum();
     let shown =
         balances.iter().filter(|balance| balance.series.best_rounds() == Rounds::All).count();
-    format!(
-        "{bad} of {all} runs were marked as disturbed; {shown} of the {} shown are.",
-        balances.len()
-    )
+    format!("{bad} of {all} runs were marked; {shown} of the {} shown are.", balances.len())
 }
 
 fn figure(balances: &[Balance], frames: u64) -> Result<Figure, ExperimentError> {
@@ -225,13 +222,10 @@ mod tests {
         // The first two are marked, for a phase counts on both of its sides.
         let disturbed = balance(&[0.3, 0.1, 0.2, 0.25, 0.15], &[2.0, 1.0]);
         assert_eq!(disturbed.usual(), 2);
-        assert_eq!(
-            marked(&[disturbed]),
-            "2 of 5 runs were marked as disturbed; 0 of the 1 shown are."
-        );
+        assert_eq!(marked(&[disturbed]), "2 of 5 runs were marked; 0 of the 1 shown are.");
         let lost = balance(&[0.3, 0.1, 0.2], &[1.0; 4]);
         assert_eq!(lost.usual(), 2);
-        assert_eq!(marked(&[lost]), "3 of 3 runs were marked as disturbed; 1 of the 1 shown are.");
+        assert_eq!(marked(&[lost]), "3 of 3 runs were marked; 1 of the 1 shown are.");
     }
     #[test]
     fn a_figure_says_how_far_workers_differ_at_most() {

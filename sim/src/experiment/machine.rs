@@ -37,6 +37,13 @@ impl Machine {
             instructions: Simd::detect().instructions().name(),
         }
     }
+
+    /// Whether two threads can have a core each, as far as is known. Where they cannot, they never gain
+    /// [`Phase::LEAST_GAIN`](super::calibrator::Phase::LEAST_GAIN), and every round is marked.
+    #[must_use]
+    pub fn has_two_cores(&self) -> bool {
+        self.cores.unwrap_or(self.threads) > 1
+    }
 }
 
 impl fmt::Display for Machine {
@@ -52,7 +59,11 @@ impl fmt::Display for Machine {
             }
             None => write!(f, "{threads} hardware thread{}", plural(*threads))?,
         }
-        write!(f, ", {system} {architecture}, kernels {instructions}")
+        write!(f, ", {system} {architecture}, kernels {instructions}")?;
+        if !self.has_two_cores() {
+            write!(f, "; without two whole cores every round is marked")?;
+        }
+        Ok(())
     }
 }
 
@@ -98,13 +109,17 @@ mod tests {
     #[test]
     fn cores_and_hardware_threads_are_told_apart() {
         let told = |threads, cores| Machine { threads, cores, ..Machine::this() }.to_string();
-        for (threads, cores, expected) in [
-            (1, Some(1), " 1 core, "),
-            (8, Some(8), " 8 cores, "),
-            (8, Some(4), " 8 hardware threads of 4 cores, "),
-            (1, None, " 1 hardware thread, "),
+        for (threads, cores, expected, is_enough) in [
+            (1, Some(1), " 1 core, ", false),
+            (2, Some(1), " 2 hardware threads of 1 core, ", false),
+            (8, Some(8), " 8 cores, ", true),
+            (8, Some(4), " 8 hardware threads of 4 cores, ", true),
+            (1, None, " 1 hardware thread, ", false),
+            (2, None, " 2 hardware threads, ", true),
         ] {
-            assert!(told(threads, cores).contains(expected), "{expected}");
+            let told = told(threads, cores);
+            assert!(told.contains(expected), "{expected}");
+            assert_eq!(told.ends_with("every round is marked"), !is_enough, "{told}");
         }
     }
 }

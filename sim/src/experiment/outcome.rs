@@ -191,12 +191,12 @@ fn in_words(all: usize, left_out: usize, shown: usize) -> String {
     let bad = left_out + shown;
     match (left_out, shown) {
         (0, 0) => format!("None of the {all} rounds was marked."),
-        _ if shown == all => format!("All {all} rounds were marked as disturbed; they are shown."),
+        _ if shown == all => format!("All {all} rounds were marked; they are shown."),
         (_, 0) => {
-            format!("{bad} of {all} rounds were marked as disturbed and are not in the figure.")
+            format!("{bad} of {all} rounds were marked and are not in the figure.")
         }
         _ => format!(
-            "{bad} of {all} rounds were marked as disturbed; {shown} of them are in the figure, where \
+            "{bad} of {all} rounds were marked; {shown} of them are in the figure, where \
              there are no others."
         ),
     }
@@ -284,10 +284,11 @@ pub(super) mod tests {
     #[test]
     fn what_is_left_out_is_said() {
         assert_eq!(in_words(20, 0, 0), "None of the 20 rounds was marked.");
-        let left_out = "5 of 20 rounds were marked as disturbed and are not in the figure.";
+        let left_out = "5 of 20 rounds were marked and are not in the figure.";
         assert_eq!(in_words(20, 5, 0), left_out);
-        assert_eq!(in_words(20, 0, 20), "All 20 rounds were marked as disturbed; they are shown.");
-        let mixed = "8 of 20 rounds were marked as disturbed; 5 of them are in the figure, where there are no others.";
+        assert_eq!(in_words(20, 0, 20), "All 20 rounds were marked; they are shown.");
+        let mixed =
+            "8 of 20 rounds were marked; 5 of them are in the figure, where there are no others.";
         assert_eq!(in_words(20, 3, 5), mixed);
     }
 }

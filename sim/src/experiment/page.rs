@@ -22,7 +22,8 @@ pub(super) fn page(machine: &Machine, plan: &Plan, reports: &[Report]) -> String
          <h1>dualframe: experiments</h1>\n\
          <p>{machine}; seed {seed}. Medians of interleaved rounds, where nothing else is said. A round is marked \
          when two independent threads gain less than {gain} over one, or a ping-pong between them takes more \
-         than {ping_pong} times what is usual; that says nothing of further cores. Marked rounds are in the CSV \
+         than {ping_pong} times what is usual: something else was running, or there are no two whole cores. That says \
+         nothing of further cores. Marked rounds are in the CSV \
          files. The paper's values are those of a 6-core Intel i7-980X.</p>\n{body}</body>\n</html>\n"
     )
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::calibrator::Phase;
 use super::error::ExperimentError;
+use super::machine::Machine;
 use super::statistics::Quartiles;
 
 /// How long to wait after a contender whose threads may go on spinning for a while: 30 ms, more than
@@ -16,10 +17,11 @@ const AFTER_SPINNING: Duration = Duration::from_millis(30);
 const MOST_FOR_A_GOOD_ROUND: usize = 4;
 
 /// So many good rounds, if up to four times as many rounds have them: what is asked for where time matters less than
-/// what is measured.
+/// what is measured. On a machine on which no round can be good no more than are wanted.
 #[must_use]
-pub fn until_good(rounds: usize) -> RangeInclusive<usize> {
-    rounds..=rounds.saturating_mul(MOST_FOR_A_GOOD_ROUND)
+pub fn until_good(rounds: usize, machine: &Machine) -> RangeInclusive<usize> {
+    let most = if machine.has_two_cores() { MOST_FOR_A_GOOD_ROUND } else { 1 };
+    rounds..=rounds.saturating_mul(most)
 }
 
 /// Something that is timed, and what it fails with.
@@ -236,6 +238,13 @@ mod tests {
         assert_eq!(series.marks(), [true, true, true, false, false]);
         let (series, _) = rounds_in(2..=4, &phases);
         assert_eq!(series.marks(), [true, true, true, false], "no more than four");
+    }
+
+    #[test]
+    fn no_good_round_is_waited_for_in_vain() {
+        let on = |cores| Machine { threads: 2, cores: Some(cores), ..Machine::this() };
+        assert_eq!(until_good(15, &on(2)), 15..=60);
+        assert_eq!(until_good(15, &on(1)), 15..=15);
     }
 
     #[test]
