@@ -33,7 +33,7 @@ pub(super) fn particles(laboratory: &mut Laboratory<'_>) -> Result<Report, Exper
         threads,
         frames: compare.frames,
         rounds: compare.rounds,
-        note: String::new(),
+        note: "",
         paper: "The pipeline is the fastest, 8 to 28 % ahead of OpenMP and TBB with 2 to 6 threads \
                 (§8.3).",
     };
@@ -47,30 +47,21 @@ pub(super) fn retraction(laboratory: &mut Laboratory<'_>) -> Result<Report, Expe
     let plan = &laboratory.plan.retraction;
     let subject = Subject::retraction()?;
     let core = if plan.keeps_core {
-        "One core is left free as for haptics, which do not run here; rayon-overlapped draws on it."
+        "One core is left free as for haptics, which do not run here; rayon-overlapped draws on it. "
     } else {
-        "There are too few cores to leave one free as for haptics."
+        "There are too few cores to leave one free as for haptics. "
     };
     let study = Study {
         tables: ["compare-craniotomy", "compare-craniotomy-rounds"],
         threads: &plan.threads,
         frames: plan.frames,
         rounds: plan.rounds,
-        note: format!("{core} {}. ", frames_of(&subject, plan.frames)),
+        note: core,
         paper: "The pipeline is the fastest, 1.3 to 1.6 times as fast as OpenMP and TBB with 2 to 5 \
                 threads; one core is kept for haptics, and the serial version runs at 99 frames per \
                 second (§8.3, Fig. 18).",
     };
     study.run(laboratory, [(subject, ["fig18-retraction", "fig18-retraction-rendering"])])
-}
-
-/// Which frames are timed, and what of them is not a retraction.
-fn frames_of(subject: &Subject, frames: u64) -> String {
-    let (script, first, last) = (subject.script_frames(), WARM_UP + 1, WARM_UP + frames);
-    match last <= script {
-        true => format!("Frames {first} to {last} of the {script} in which the hands move"),
-        false => format!("Frames {first} to {last}; the hands move up to frame {script}"),
-    }
 }
 
 /// What a title and a caption say of the share that rendering came to, which need not be the one that was meant.
@@ -99,7 +90,7 @@ struct Study<'a> {
     frames: u64,
     rounds: usize,
     /// What is to be known of the figures besides what was found: nothing, or whole sentences.
-    note: String,
+    note: &'static str,
     paper: &'static str,
 }
 
@@ -157,13 +148,19 @@ impl Study<'_> {
             RenderLoad::StandIn(_) => outcome.render_share(without),
         };
         let [in_title, rendering] = share.map(rendering).unwrap_or_default();
+        let frames = outcome.race.timed() + ". ";
         Chart {
             name,
             title: format!("Speed-up over serial, {subject}{in_title}"),
             x_label: "threads",
             y_label: "speed-up S_s = T_s / T_p",
             x_counts: true,
-            finding: self.finding(outcome) + &rendering + &self.note + PEERS + &marked([outcome]),
+            finding: self.finding(outcome)
+                + &rendering
+                + self.note
+                + &frames
+                + PEERS
+                + &marked([outcome]),
             paper: self.paper,
         }
         .lines(lines.collect())
@@ -213,7 +210,7 @@ mod tests {
             threads: &[1, 2],
             frames: 100,
             rounds: 3,
-            note: String::new(),
+            note: "",
             paper: "",
         };
         let took = |runner: &Runner| match (runner.executor, runner.threads) {

@@ -21,10 +21,12 @@ const ROUND_COLUMNS: [&str; 10] = [
 ];
 
 /// The columns of [`Outcome::add_summary`].
-const SUMMARY_COLUMNS: [&str; 18] = [
+const SUMMARY_COLUMNS: [&str; 20] = [
     "objects",
     "load",
     "render_share",
+    "first_frame",
+    "last_frame",
     "executor",
     "threads",
     "which_rounds",
@@ -150,6 +152,8 @@ impl Outcome {
             &self.race.subject.objects(),
             &self.race.load.name(),
             &cell(share),
+            &(self.race.warm_up + 1),
+            &(self.race.warm_up + self.race.frames),
             &runner.executor.name(),
             &runner.threads,
             &name,
@@ -255,10 +259,10 @@ pub(super) mod tests {
         let mut table = Outcome::summary_table("summary");
         outcome.add_summary(&outcome, &mut table);
         let row = &table.rows[2];
-        assert_eq!(row[..7], ["4", "null", "0.0000", "pipeline", "2", "all", "3"]);
-        assert_eq!(row[7..11], ["2.500000", "2.500000", "2.500000", "40.00"]);
+        assert_eq!(row[..9], ["4", "null", "0.0000", "1", "100", "pipeline", "2", "all", "3"]);
+        assert_eq!(row[9..13], ["2.500000", "2.500000", "2.500000", "40.00"]);
         let ratios = ["2.4000", "2.4000", "2.4000", "1.6000", "1.6000", "1.6000", "0.8000"];
-        assert_eq!(row[11..], ratios, "S_s, S_p and E_p");
+        assert_eq!(row[13..], ratios, "S_s, S_p and E_p");
     }
 
     #[test]

@@ -85,6 +85,19 @@ impl fmt::Display for Race {
 pub(super) type OnFrame<'a> = dyn FnMut(usize, &FrameRecord, Duration) + Send + 'a;
 
 impl Race {
+    /// Which frames are timed, the first of all being 1, and what of them hands do not move in; in words.
+    pub(super) fn timed(&self) -> String {
+        let (script, first) = (self.subject.script_frames(), self.warm_up + 1);
+        let last = self.warm_up + self.frames;
+        match script {
+            0 => format!("Frames {first} to {last}"),
+            _ if last <= script => {
+                format!("Frames {first} to {last} of the {script} in which the hands move")
+            }
+            _ => format!("Frames {first} to {last}; the hands move up to frame {script}"),
+        }
+    }
+
     /// Times the runners against each other. `phase` measures the machine's present phase, `done` is
     /// told after each run.
     ///

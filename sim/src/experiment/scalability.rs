@@ -39,6 +39,14 @@ pub(super) fn run(laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentE
     Ok(Report { tables: vec![summary, rounds], figures, shown: None })
 }
 
+/// Which frames were timed, how often, and how many rounds were marked.
+fn rounds(outcomes: &[Outcome]) -> String {
+    let timed = outcomes.first().map(|Outcome { race, series, .. }| {
+        format!("{}, {} rounds of each size. ", race.timed(), series.rounds().len())
+    });
+    timed.unwrap_or_default() + &marked(outcomes)
+}
+
 /// Fig. 11.
 fn throughput(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, ExperimentError> {
     let throughput = |runner| {
@@ -68,7 +76,7 @@ fn throughput(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Experim
         title: "Throughput".to_owned(),
         x_label: "objects",
         y_label: "frames per second",
-        finding: format!("{}: {}. {}", named(most), ends.join(", "), marked(outcomes)),
+        finding: format!("{}: {}. {}", named(most), ends.join(", "), rounds(outcomes)),
         paper: "Each additional thread increases the throughput (Fig. 11).",
         ..Chart::default()
     }
@@ -103,7 +111,7 @@ fn speed_ups(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Experime
         finding: format!(
             "With {} the speed-up is {least:.2} to {greatest:.2}. {}",
             named(most),
-            marked(outcomes)
+            rounds(outcomes)
         ),
         paper: "Near-linear; it drops by 0.2 to 0.6 % with each 100 further objects (§8.1).",
         ..Chart::default()
@@ -135,7 +143,7 @@ fn efficiencies(outcomes: &[Outcome], threads: &[usize]) -> Result<Figure, Exper
         finding: format!(
             "The efficiency is at least {:.3}. {}",
             rounded_down(least, 3),
-            marked(outcomes)
+            rounds(outcomes)
         ),
         paper: "Greater than 0.89 in all cases, up to 6 threads and 1,000 objects (§8.1, Fig. 13).",
         ..Chart::default()
@@ -177,7 +185,7 @@ mod tests {
         let seconds = [Runner::SERIAL, Runner::pipeline(1), Runner::pipeline(2)].into_iter();
         let seconds: Vec<_> = seconds.zip([6.0, 4.0, 2.5]).collect();
         let outcomes = [outcome(100, &seconds, &[2.0; 4])];
-        let none = "None of the 3 rounds was marked.";
+        let none = "Frames 1 to 100, 3 rounds of each size. None of the 3 rounds was marked.";
         let finding =
             |figure: Result<Figure, ExperimentError>| figure.expect("it is drawn").finding;
         let reached = "40 frames per second with 4 objects";
