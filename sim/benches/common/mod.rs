@@ -17,7 +17,8 @@ pub(crate) struct Arguments {
     /// Good rounds of each race; where the machine is disturbed, up to four times as many rounds are run.
     #[arg(long, value_name = "N", default_value_t = 15, value_parser = at_least_one(u64::MAX))]
     rounds: usize,
-    /// Frames of each run; by default about as many as take 150 ms on one thread.
+    /// Frames of each run; by default about as many as take some tenths of a second on one thread, or a second or so
+    /// where objects are many or heavy.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) frames: Option<u64>,
     /// Numbers of particles; of no effect where there are none.
