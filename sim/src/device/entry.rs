@@ -29,9 +29,14 @@ impl SmoothEntry {
         Self::new(shown, new, time, self.over)
     }
 
+    /// How much longer the new model takes to come in, in seconds.
+    pub(super) fn left(&self, time: f64) -> f64 {
+        (self.over - (time - self.began)).max(0.0)
+    }
+
     /// What to show for a model that says `new`.
     pub(super) fn apply(&self, new: Wrench, time: f64) -> Wrench {
-        let left = 1.0 - ((time - self.began) / self.over).clamp(0.0, 1.0);
+        let left = self.left(time) / self.over;
         // Also for a blend of no time, which is 0/0 at its beginning.
         let left = if left > 0.0 { left as f32 } else { 0.0 };
         Wrench {

@@ -20,7 +20,8 @@ pub struct ForceSettings {
     /// The most by which the torque changes from one tick to the next, in newton metres. Usually 0.02: as
     /// `max_step`, with the 4 cm from a tool's tip to the grip.
     pub max_torque_step: f32,
-    /// How long a new model takes to come in, in seconds. Usually 1/60: a frame.
+    /// How long a new model takes to come in, in seconds. Usually 1/60: a frame. One that follows while forces still
+    /// come in after a stall takes as long as they do.
     pub entry: f64,
     /// How long after its predecessor a model may come before forces fade, in seconds. Usually 0.05:
     /// three frames of 1/60 s. Where models come more slowly it is three times the last interval, at most 0.25 s.
@@ -209,7 +210,9 @@ impl ForceLaw {
     fn enter(&mut self, time: f64, position: Vec3, model: &LocalModel, is_new: bool) {
         let begins = self.last.is_none() || self.watchdog.share(time) < 1.0;
         let shown = if begins { self.wrench } else { self.wanted(time, position) };
-        let over = if begins { self.settings.fade } else { self.settings.entry };
+        let ForceSettings { fade, entry, .. } = self.settings;
+        // What still comes in after a stall is not to come faster for a model that follows.
+        let over = if begins { fade } else { entry.max(self.entry.left(time)) };
         let new = Bounded::new(*model, &self.device);
         if is_new {
             self.watchdog.feed(time);

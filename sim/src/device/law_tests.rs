@@ -173,3 +173,25 @@ fn an_error_is_of_what_replaces_another_model() {
     let Forces { models, interpolation_error, .. } = *law.forces();
     assert_eq!((models, interpolation_error), (4, 1.0));
 }
+
+/// With a model every 17 ms a force takes its time to come in, after silence, a stall, and a lost sample.
+#[test]
+fn models_that_follow_do_not_hurry_what_comes_in() {
+    let (mut law, mut number) = (law(), 0);
+    let inside = DeviceSample::at(Vec3::Y * -2e-3);
+    let mut step = |law: &mut ForceLaw, tick: u64, comes: bool| {
+        number += u64::from(comes);
+        law.step(tick as f64 * PERIOD, &inside, (number, &WALL)).force.y
+    };
+    for (begin, what) in [(0, "silence"), (1_000, "a stall"), (2_000, "a lost sample")] {
+        let ticks = begin..begin + 400;
+        let forces: Vec<f32> =
+            ticks.map(|tick| step(&mut law, tick, (tick - begin).is_multiple_of(17))).collect();
+        assert!((forces[50] - 1.0).abs() < 0.1, "after {what}: {forces:?}");
+        assert!((forces[120] - 2.0).abs() < 1e-3 && smooth(&forces), "after {what}: {forces:?}");
+        match begin {
+            0 => (400..1_000).for_each(|tick| _ = step(&mut law, tick, false)),
+            _ => (0..10).for_each(|_| _ = law.step_blind()),
+        }
+    }
+}
