@@ -159,7 +159,7 @@ impl ForceLaw {
             self.last.map_or((Vec3::ZERO, 0.0), |(then, place)| (position - place, time - then));
         self.passivity.observe(self.wrench.force, way);
         if let Some(Blind { place, ticks, forces }) = self.blind.take() {
-            let mean = (forces + self.wrench.force) / (ticks + 1) as f32;
+            let mean = (forces + self.wrench.force) / (ticks as f32 + 1.0);
             self.passivity.observe(mean, position - place);
         }
         let is_new = number != self.number;

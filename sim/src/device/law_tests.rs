@@ -195,3 +195,14 @@ fn models_that_follow_do_not_hurry_what_comes_in() {
         }
     }
 }
+
+/// However long a device could not be read: as many ticks as can be counted.
+#[test]
+fn a_device_that_is_back_after_weeks_is_felt() {
+    let mut law = law();
+    rest(&mut law, 1, 400);
+    (0..10).for_each(|_| _ = law.step_blind());
+    law.blind.as_mut().expect("it was not read").ticks = u32::MAX;
+    let back = rest(&mut law, 420, 820);
+    assert!((back[399] - 2.0).abs() < 1e-3, "{}", back[399]);
+}
