@@ -9,8 +9,9 @@ use std::time::Duration;
 use dualframe_sim::device::law::ForceSettings;
 use dualframe_sim::device::link::{HapticLink, SimulationEnd, ToolState};
 use dualframe_sim::device::model::LocalModel;
+use dualframe_sim::device::motion::Motion;
 use dualframe_sim::device::mouse::Mouse;
-use dualframe_sim::device::operator::SimulatedDevice;
+use dualframe_sim::device::operator::{Hand, SimulatedDevice};
 use dualframe_sim::device::thread::{HapticLoop, HapticThread, LoopError, RATE};
 use dualframe_sim::device::{DeviceDescription, DeviceError, DeviceSample, HapticDevice, Wrench};
 use glam::{Mat3, Vec3};
@@ -85,6 +86,27 @@ fn stops_when_dropped_and_lets_go() {
         assert_eq!(reads.load(Ordering::SeqCst), stopped, "it ticks on");
         let written = writes.load(Ordering::SeqCst);
         assert_eq!(written, stopped + 1, "one write a tick, and one that lets go");
+    });
+}
+
+/// A tool that was pressed when its loop was stopped: the simulation is told that nobody reads or pushes it any more.
+#[test]
+fn a_loop_that_is_stopped_says_so() {
+    let mut link = HapticLink::new();
+    let (end, mut simulation) = link.split();
+    let place = Motion::at_rest(Vec3::X).expect("finite");
+    let device = SimulatedDevice::new(Hand::FIRM, place);
+    scope(|scope| {
+        let settings = ForceSettings::default();
+        let haptics = HapticThread::spawn(scope, device, end, settings, RATE).expect("it starts");
+        let force = Vec3::Y * 5.0;
+        simulation.deliver(LocalModel { force, ..LocalModel::FREE }).expect("finite");
+        let pushed = until(&mut simulation, |tool| tool.wrench.force.y > 0.0);
+        assert!(pushed.is_fresh);
+        drop(haptics);
+        let last = simulation.tool();
+        assert_eq!((last.is_fresh, last.fault, last.wrench), (false, None, Wrench::default()));
+        assert!(last.time >= pushed.time && last.sample.position.distance(Vec3::X) < 0.1);
     });
 }
 

@@ -20,7 +20,7 @@ pub struct ToolState {
     pub time: f64,
     /// The last sample.
     pub sample: DeviceSample,
-    /// Whether that was read then; else it is an older one.
+    /// Whether that was read then; else it is an older one, as after the loop was stopped.
     pub is_fresh: bool,
     /// What is being exerted.
     pub wrench: Wrench,

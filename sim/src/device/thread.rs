@@ -107,8 +107,9 @@ impl<'c, D: HapticDevice> HapticLoop<'c, D> {
 }
 
 /// The haptic loop in a thread. It sleeps between ticks, takes no lock, and waits for nobody but the
-/// device. Dropping it stops the loop, lets the device go without force, and joins the thread. A driver that panics
-/// ends the loop: the device is let go, and the simulation sees [`DeviceError::Panicked`].
+/// device. Dropping it stops the loop, lets the device go without force, tells the simulation that nobody reads it any
+/// more, and joins the thread. A driver that panics ends the loop: the device is let go, and the simulation sees
+/// [`DeviceError::Panicked`].
 #[derive(Debug)]
 pub struct HapticThread<'scope> {
     stop: Arc<AtomicBool>,
@@ -177,9 +178,8 @@ impl<D: HapticDevice> HapticLoop<'_, D> {
         let ticking = catch_unwind(AssertUnwindSafe(|| self.tick_until(period, stop)));
         // A device that cannot be told to let go now lets go by its own watchdog.
         let _ = catch_unwind(AssertUnwindSafe(|| self.device.write(Wrench::default())));
-        if ticking.is_err() {
-            self.publish(Wrench::default(), false, Some(DeviceError::Panicked));
-        }
+        // What was said last would pass for what a hand still does.
+        self.publish(Wrench::default(), false, ticking.err().map(|_| DeviceError::Panicked));
     }
 
     /// A tick that comes too late for the next one leaves that one out: ticks in a burst would be ticks of

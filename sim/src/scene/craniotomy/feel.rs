@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use glam::{Mat3, Vec3};
 
-use super::SKULL;
+use super::{SKULL, TIME_STEP};
 use crate::behavior::drill::Coupling;
 use crate::behavior::{Tool, Work};
 use crate::device::link::{SimulationEnd, ToolState};
@@ -18,8 +18,8 @@ use crate::object::{Object, ObjectId};
 const TOUCHED: usize = 2;
 /// Likewise where the tool was when that which it holds was drawn there, which has told since.
 const HELD: usize = 3;
-/// How long a device may not be read before its buttons count as let go of, in seconds of its loop's clock; usually 0.25:
-/// a drill whose device was pulled out is not to go on.
+/// How long a device may not be read before its buttons count as let go of, in seconds of its loop's clock, or of frames
+/// in which the loop says nothing; usually 0.25: a drill whose device was pulled out is not to go on.
 const LETS_GO: f64 = 0.25;
 /// How far a drill is led beside the device at most, in metres; usually 1 mm.
 const SHIFT: f32 = 0.001;
@@ -52,6 +52,8 @@ pub(super) struct Feel<'c> {
     told: Option<ToolState>,
     /// From when on swaps found that the device could not be read, in seconds of the loop's clock, if the last one did.
     silent: Option<f64>,
+    /// At how many swaps in a row the loop had said nothing new.
+    still: u32,
     /// The device at the first look in the frame that is being drawn.
     now: Option<ToolState>,
     /// The device at the last swaps, the last one last.
@@ -96,8 +98,8 @@ impl<'c> Feel<'c> {
         let past = VecDeque::with_capacity(HELD + 2);
         let (now, next, tool, bones, drags) = (None, None, None, Vec::new(), Default::default());
         let (rest, shift, grasp) = (None, None, Vec3::ZERO);
-        let (told, silent) = (None, None);
-        Self { end, told, silent, now, past, next, tool, bones, rest, shift, grasp, drags }
+        let (told, silent, still) = (None, None, 0);
+        Self { end, told, silent, still, now, past, next, tool, bones, rest, shift, grasp, drags }
     }
 
     pub(super) fn into_end(self) -> SimulationEnd<'c> {
@@ -171,18 +173,13 @@ impl<'c> Feel<'c> {
     /// The frame was swapped: where the device is that the tool follows, from now on.
     pub(super) fn sample(&mut self) -> Option<DeviceSample> {
         let (told, last) = (self.end.tool(), self.device().copied());
-        if told.is_fresh || told.fault.is_some() {
-            self.told = Some(told);
-        }
-        // Since the first swap at which it was not read: a slow frame is not the device's silence.
-        self.silent = if told.is_fresh { None } else { self.silent.or(Some(told.time)) };
+        self.hear(&told);
         self.past.extend(told.is_fresh.then_some(told).or(last));
         if self.past.len() > HELD + 1 {
             self.past.pop_front();
         }
         let mut sample = self.device()?.sample;
-        let is_over = told.fault == Some(DeviceError::Panicked);
-        if is_over || self.silent.is_some_and(|since| told.time - since > LETS_GO) {
+        if self.lets_go(&told) {
             sample.buttons = 0;
         }
         match self.tool.map(|tool| tool.push) {
@@ -197,6 +194,26 @@ impl<'c> Feel<'c> {
             None => {}
         }
         Some(sample)
+    }
+
+    /// The loop had said this at a swap.
+    fn hear(&mut self, told: &ToolState) {
+        let is_old = self.told.is_some_and(|before| before.time == told.time);
+        self.still = if is_old { self.still.saturating_add(1) } else { 0 };
+        // Since the first swap at which it was not read: a slow frame is not the device's silence.
+        self.silent = if told.is_fresh { None } else { self.silent.or(Some(told.time)) };
+        if told.ticks.due > 0 {
+            self.told = Some(*told);
+        }
+    }
+
+    /// Whether it is too long since the device was read for its buttons to count.
+    fn lets_go(&self, told: &ToolState) -> bool {
+        let is_over = told.fault == Some(DeviceError::Panicked);
+        let unread = self.silent.map_or(0.0, |since| told.time - since);
+        // The clock of a loop that was stopped, or whose driver hangs, stands still.
+        let unheard = f64::from(self.still) * f64::from(TIME_STEP);
+        is_over || unread.max(unheard) > LETS_GO
     }
 
     /// The device in the frame that is being drawn, as far as its loop has said anything that counts.

@@ -1,4 +1,6 @@
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{scope, sleep};
+use std::time::Duration;
 
 use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
@@ -13,7 +15,7 @@ use crate::device::link::HapticLink;
 use crate::device::motion::{Keyframe, Motion, ScriptedDevice};
 use crate::device::operator::SimulatedDevice;
 use crate::device::proxy::Surface;
-use crate::device::thread::HapticLoop;
+use crate::device::thread::{HapticLoop, HapticThread, RATE};
 use crate::device::{DeviceDescription, DeviceError, HapticDevice, Wrench};
 use crate::executor::{Executor, SerialExecutor};
 use crate::geometry::{Geometry, Rigid, Volume};
@@ -245,6 +247,46 @@ fn a_device_that_is_gone_is_told_of_and_lets_go() {
     is_gone.store(false, Ordering::Relaxed);
     ticking.tick(0.6);
     assert_eq!(feel.sample(), Some(pressed), "it is there again");
+}
+
+/// A driver that hangs, or a loop that was stopped, with the button down: after 0.25 s of frames the tool lets go.
+#[test]
+fn a_loop_that_says_nothing_lets_go() {
+    let mut link = HapticLink::new();
+    let (end, simulation) = link.split();
+    let is_gone = AtomicBool::new(false);
+    let device = Plugged(DeviceSample { buttons: 1, ..DeviceSample::at(LID) }, &is_gone);
+    let mut feel = Feel::new(simulation);
+    let mut ticking = HapticLoop::new(device, end, ForceSettings::default());
+    for tick in 1..=2 {
+        ticking.tick(f64::from(tick));
+        let buttons: Vec<u32> =
+            (0..20).map(|_| feel.sample().expect("it was said").buttons).collect();
+        assert_eq!(buttons[..15], [1; 15], "for a slow tick nobody lets go");
+        assert_eq!(buttons[16..], [0; 4]);
+    }
+}
+
+/// A loop that was stopped with the button down is told of.
+#[test]
+fn a_loop_that_was_stopped_is_told_of() {
+    let mut link = HapticLink::new();
+    let (end, simulation) = link.split();
+    let is_gone = AtomicBool::new(false);
+    let device = Plugged(DeviceSample { buttons: 1, ..DeviceSample::at(LID) }, &is_gone);
+    let mut feel = Feel::new(simulation);
+    scope(|scope| {
+        let settings = ForceSettings::default();
+        let haptics = HapticThread::spawn(scope, device, end, settings, RATE).expect("it starts");
+        while feel.sample().is_none_or(|sample| sample.buttons == 0) {
+            sleep(Duration::from_millis(1));
+        }
+        assert!(feel.told().is_some_and(|told| told.is_fresh));
+        drop(haptics);
+        let last = (0..20).map(|_| feel.sample()).last().flatten();
+        assert_eq!(last, Some(DeviceSample::at(LID)), "its tool has let go");
+    });
+    assert!(feel.told().is_some_and(|told| !told.is_fresh && told.ticks.due > 0));
 }
 
 /// Bone that is drawn no more, since it was removed or hidden, neither pushes a hand nor holds its tool out.
