@@ -137,8 +137,10 @@ impl<'c> Feel<'c> {
         };
         let (bone, place) = (object.id(), device.sample.position);
         let known = self.bones.binary_search_by_key(&bone, |near| near.bone);
+        // A flap that comes free under a hand is bone that the hand rests on already.
+        let proxy = Proxy::new(self.rest.unwrap_or(place));
         let index = known.unwrap_or_else(|index| {
-            self.bones.insert(index, Near { bone, proxy: Proxy::new(place), is_drawn: true });
+            self.bones.insert(index, Near { bone, proxy, is_drawn: true });
             index
         });
         let near = &mut self.bones[index];

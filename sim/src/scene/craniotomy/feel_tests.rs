@@ -361,3 +361,28 @@ fn bone_only_pushes_also_beside_what_is_cut() {
     let cut = CUTTING / CUTTING_GIVES * 2e-3;
     assert!((outside.y + cut).abs() < 1e-3 && outside.x > 0.3, "{outside}");
 }
+
+/// An object of bone of 10 × 10 × 4 mm around the origin, from the upper side on down.
+fn bone(id: ObjectId) -> Object {
+    Object::new(id, SKULL_GROUP, Geometry::Volume(slab(Vec3::ZERO)), Bone::new())
+}
+
+/// An elevator that presses on a flap as it comes free: it is pushed as before, not let through.
+#[test]
+fn a_flap_that_comes_free_under_a_hand_is_felt() {
+    let deep = Vec3::Z * -2e-3;
+    let mut link = HapticLink::new();
+    let motion = way(&[(0, Vec3::Z * 0.005, false), (10, deep, false)]);
+    let mut hand = Hand::new(&mut link, &motion);
+    let (rigid, tool) =
+        Tool::new(Instrument::Elevator, DeviceSample::at(deep), Workpieces::default());
+    let tool = Object::new(TOOL, TOOL_GROUP, Geometry::Rigid(rigid), tool);
+    for frame in 0..40 {
+        hand.ticking.tick(f64::from(frame) * f64::from(TIME_STEP));
+        hand.feel.tool(&tool);
+        hand.feel.bone(&bone(if frame < 20 { SKULL } else { PIECE }));
+        hand.feel.deliver();
+        let place = hand.feel.sample().expect("the device has told").position;
+        assert!(frame < 10 || place.z.abs() < 2e-4, "{place}, frame {frame}");
+    }
+}
