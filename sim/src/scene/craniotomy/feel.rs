@@ -345,11 +345,11 @@ fn spring(force: Vec3, stiffness: f32, normal: Option<Vec3>, then: &ToolState) -
     LocalModel { force, gradient, position, time, normal, ..LocalModel::FREE }
 }
 
-/// Both together, where the first one holds.
+/// Both together, where the first one holds; as old as the older one.
 fn sum(first: LocalModel, other: LocalModel) -> LocalModel {
     let there = other.force + other.gradient * (first.position - other.position);
     let (force, gradient) = (first.force + there, first.gradient + other.gradient);
-    LocalModel { force, gradient, ..first }
+    LocalModel { force, gradient, time: first.time.min(other.time), ..first }
 }
 
 #[cfg(test)]

@@ -386,3 +386,10 @@ fn a_flap_that_comes_free_under_a_hand_is_felt() {
         assert!(frame < 10 || place.z.abs() < 2e-4, "{place}, frame {frame}");
     }
 }
+
+/// Of what pulls together, each as old as its frame, the whole is as old as the oldest.
+#[test]
+fn a_sum_is_as_old_as_its_oldest_part() {
+    let [new, old] = [2.0, 1.0].map(|time| LocalModel { time, ..LocalModel::FREE });
+    assert_eq!((sum(new, old).time, sum(old, new).time), (1.0, 1.0));
+}
