@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::opening::{Margin, Opening};
+use crate::behavior::drill::Bit;
 use crate::behavior::{Instrument, Tool};
 use crate::object::Object;
 use crate::scene::head::Entry;
@@ -14,6 +15,9 @@ const FORCE_STEPS: usize = 400;
 /// How far below the inner table the dura lies, and gives way to a bit without harm, in metres; usually
 /// 1 mm: half a millimetre of dura, and what it yields.
 const DURA_GIVES: f32 = 0.001;
+/// How deep a perforator must be in a hole to bore it on, and not to begin another one, in metres; usually 1 mm: what is
+/// less deep is a scratch.
+const BORED: f32 = 0.001;
 
 /// What is counted while an operation goes on; see [`Operation::report`](super::Operation::report).
 #[derive(Clone, Debug)]
@@ -74,7 +78,8 @@ pub struct Report {
     pub dural_tears: u32,
     /// How far they went in it, in metres.
     pub dural_tear_length: f32,
-    /// How the last burr hole was begun; none without one.
+    /// How the last burr hole was begun; none without one. A perforator that goes back into it, or turns on in it, begins
+    /// no other.
     pub burr_hole: Option<Placement>,
     /// The opening's edge; none before there is one.
     pub margin: Option<Margin>,
@@ -132,7 +137,9 @@ impl Score {
         }
         let force = work.bone.length();
         let perforates = tool.instrument() == Instrument::Perforator && force > 0.0;
-        if perforates && !self.perforates[hand] {
+        // One that stopped in its hole, or was lifted out of it, bores on.
+        let bores_on = self.perforates[hand] || self.hole.is_some_and(|hole| is_in(hole, tip));
+        if perforates && !bores_on {
             self.hole = Some((tip, rigid.pose.rotation * Vec3::Z));
         }
         self.perforates[hand] = perforates;
@@ -186,6 +193,12 @@ impl Score {
         });
         if drilling == 0 { 0.0 } else { (step.unwrap_or(0) + 1) as f32 * FORCE_STEP }
     }
+}
+
+/// Whether a tip is in a hole that was begun with the tip at a place and the handle in a direction.
+fn is_in((begun, axis): (Vec3, Vec3), tip: Vec3) -> bool {
+    let depth = (begun - tip).dot(axis);
+    depth > BORED && tip.distance(begun - axis * depth) < Bit::PERFORATOR.radius
 }
 
 /// Beside the plan, a hole that was begun with the tip at a place and the handle in a direction.
