@@ -7,7 +7,6 @@ use std::thread;
 
 use dualframe_render_wgpu::camera::Camera;
 use dualframe_render_wgpu::look::Look;
-use dualframe_sim::behavior::Bone;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::device::link::{HapticLink, SimulationEnd, ToolState};
 use dualframe_sim::device::motion::Motion;
@@ -239,11 +238,12 @@ impl<'c> Surgery<'c> {
     }
 
     fn report(&self, manager: &VeManager) -> OperationReport {
+        let score = self.score(manager);
         OperationReport {
             step: self.step.map_or("by hand", Step::name),
             pieces: self.pieces,
-            bone_removed_mm3: removed(manager) * 1e9,
-            score: self.score(manager).into(),
+            bone_removed_mm3: score.bone_removed * 1e9,
+            score: score.into(),
             haptics: self.devices.iter().flatten().map(Into::into).collect(),
         }
     }
@@ -258,17 +258,6 @@ pub(super) fn look(region: Bounds) -> (Look, Camera) {
     // The whole head, for its shadows.
     let focus = Bounds { min: Vec3::splat(-0.11), max: Vec3::splat(0.11) };
     (Look { light, room: false, ..Look::room(focus) }, camera)
-}
-
-/// The bone that was drilled away, in cubic metres of full bone.
-fn removed(manager: &VeManager) -> f64 {
-    let mut removed = 0.0;
-    manager.visit(&mut |object| {
-        let behavior: &dyn std::any::Any = &*object.behavior;
-        let bone = behavior.downcast_ref::<Bone>().zip(object.geometry.as_volume());
-        removed += bone.map_or(0.0, |(bone, volume)| bone.removed_volume(volume));
-    });
-    removed
 }
 
 /// Writes the computed tomography as it is after the operation; bone that lies elsewhere is gone.

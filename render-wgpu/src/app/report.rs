@@ -54,7 +54,7 @@ pub(super) struct OperationReport {
     pub(super) step: &'static str,
     /// Pieces of bone that came free.
     pub(super) pieces: usize,
-    /// Bone that was drilled away, in cubic millimetres of full bone.
+    /// Bone that was drilled away, of the skull and of pieces, in cubic millimetres of full bone.
     pub(super) bone_removed_mm3: f64,
     pub(super) score: ScoreReport,
     /// Of the hands' haptic loops, where there were some.

@@ -12,6 +12,7 @@ use dualframe_sim::render::NullRenderer;
 use dualframe_sim::scene::craniotomy::{Operation, Report, SKULL, Step, TOOLS};
 use dualframe_sim::scene::head::Entry;
 use glam::{Quat, Vec3};
+use parry3d::math::Pose;
 
 use super::{PIECE, Theatre, head};
 
@@ -156,6 +157,31 @@ fn the_flap_takes_nothing_out_of_the_plan() {
     let volume = piece.geometry.as_volume_mut().expect("bone");
     volume.pose.translation += Vec3::splat(0.03);
     assert_eq!(outside(&piece), before);
+}
+
+/// What is drilled off a piece that came free is removed, as what is drilled off the skull.
+#[test]
+fn bone_of_pieces_counts() {
+    let hole = &head().plan.burr_hole;
+    let carved = Carved::new().through(Bit::CRANIOTOME, hole);
+    let of_skull = carved.removed();
+    let spacing = head().skull.spacing();
+    let block = Volume::from_fn([20; 3], spacing, Pose::IDENTITY, |_| 255);
+    let mut block = block.expect("it is small");
+    let mut piece = Piece::new(&block).loose();
+    let center = spacing * 10.0;
+    let burr = Burr { bit: Bit::BURR, center, axis: Vec3::Z, spin: 1e3, side: None };
+    let erosions = piece.erosions().expect("bone is drilled");
+    erosions.add(Erode { burr, load: 1e9 });
+    erosions.apply(&mut block, 0, 1.0);
+    let of_piece = piece.removed() as f64 / 255.0 * f64::from(block.voxel_volume());
+    assert!(of_skull > 10e-9 && of_piece > 10e-9, "{of_skull} m³, {of_piece} m³");
+    let piece = Object::new(PIECE, Group(2), Geometry::Volume(block), piece);
+    let skull = Object::new(SKULL, Group(1), Geometry::Volume(carved.skull), carved.bone);
+    let operation = Operation::new(head(), None);
+    let report = operation.report(|see| [&skull, &piece].into_iter().for_each(see));
+    assert!((report.bone_removed - of_skull - of_piece).abs() < 1e-15, "{report:?}");
+    assert!((report.bone_outside_plan - of_piece).abs() < 1e-15, "{report:?}");
 }
 
 /// Where a perforator starts that is led along `axis` to a place on the outer table.

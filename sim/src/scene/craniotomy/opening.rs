@@ -138,11 +138,20 @@ impl<'a> Opening<'a> {
         self.margin
     }
 
-    /// The bone that was drilled away and not planned, in cubic metres of full bone.
+    /// The bone that was drilled away, in cubic metres of full bone.
+    pub(super) fn removed(&self) -> f64 {
+        self.volume(self.removed)
+    }
+
+    /// What of it was not planned; likewise.
     pub(super) fn outside(&self) -> f64 {
         let planned = self.planned.full.saturating_sub(self.left);
-        let voxels = self.removed.saturating_sub(planned) as f64 / 255.0;
-        voxels * f64::from(self.head.skull.voxel_volume())
+        self.volume(self.removed.saturating_sub(planned))
+    }
+
+    /// The volume of so much bone, in cubic metres; 255 are a full voxel.
+    fn volume(&self, bone: u64) -> f64 {
+        bone as f64 / 255.0 * f64::from(self.head.skull.voxel_volume())
     }
 }
 

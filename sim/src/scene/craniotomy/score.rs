@@ -83,8 +83,9 @@ pub struct Report {
     pub burr_hole: Option<Placement>,
     /// The opening's edge; none before there is one.
     pub margin: Option<Margin>,
-    /// The bone that was drilled away more than a millimetre beside the planned cut and burr hole, in cubic
-    /// metres of full bone.
+    /// The bone that was drilled away, of the skull and of pieces that came free, in cubic metres of full bone.
+    pub bone_removed: f64,
+    /// What of it was more than a millimetre beside the planned cut and burr hole, in cubic metres of full bone.
     pub bone_outside_plan: f64,
 }
 
@@ -178,6 +179,7 @@ impl Score {
             dural_tear_length: self.tear,
             burr_hole: self.hole.map(|hole| placement(hole, planned)),
             margin: opening.margin(),
+            bone_removed: opening.removed(),
             bone_outside_plan: opening.outside(),
         }
     }
