@@ -75,7 +75,7 @@ pub enum BuildError {
     Response(#[from] ResponseError),
 }
 
-/// The environment before an operation on a head: 30 objects.
+/// The environment before an operation on a head: 30 objects. Its time step stays as it is: [`TIME_STEP`].
 ///
 /// # Errors
 /// A structure that is no tissue; none is known for a [`Head`].

@@ -29,7 +29,11 @@ pub use steps::Step;
 
 use super::head::Head;
 
-/// The time from one frame to the next, in seconds; usually 1/60.
+/// The time from one frame to the next, in seconds; usually 1/60. A craniotomy has no other: with one that
+/// [`VeManager::change`] sets, bone would stop free pieces too early or too late, and seconds of the script and of the
+/// score would be none.
+///
+/// [`VeManager::change`]: crate::manager::VeManager::change
 pub const TIME_STEP: f32 = 1.0 / 60.0;
 /// The two tools.
 pub const TOOLS: [ObjectId; 2] = [ObjectId(0), ObjectId(1)];
