@@ -165,8 +165,7 @@ impl Surface for Bone {
 fn haptics(manager: &mut VeManager, seconds: f64) -> ToolState {
     let mut link = HapticLink::new();
     let (end, mut simulation) = link.split();
-    let pressing = Motion::at_rest(Vec3::Y * -0.01).expect("finite");
-    let device = SimulatedDevice::new(Hand::FIRM, pressing);
+    let device = SimulatedDevice::new(Hand::FIRM, pressing());
     let mut proxy = Proxy::new(Vec3::Y);
     scope(|scope| {
         let settings = ForceSettings::default();
@@ -183,6 +182,12 @@ fn haptics(manager: &mut VeManager, seconds: f64) -> ToolState {
         }
         simulation.tool()
     })
+}
+
+/// A hand that comes from above bone and presses: one that began in it would have energy that it never put in.
+fn pressing() -> Motion {
+    let to = |time: f64, height: f32| Keyframe { time, sample: DeviceSample::at(Vec3::Y * height) };
+    Motion::new([to(0.0, 0.002), to(0.1, -0.01)]).expect("in order")
 }
 
 /// The haptic loop in the craniotomy: a hand strokes over the skull with an elevator.
