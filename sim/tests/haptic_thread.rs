@@ -110,6 +110,21 @@ fn a_loop_that_is_stopped_says_so() {
     });
 }
 
+/// However late a tick is, those that were due until then were counted, and no others.
+#[test]
+fn as_many_ticks_are_due_as_periods_have_passed() {
+    let (mut link, mut mouse) = (HapticLink::new(), Mouse::new(Vec3::ZERO));
+    let ((end, mut simulation), (_, device)) = (link.split(), mouse.split());
+    scope(|scope| {
+        let settings = ForceSettings::default();
+        let _haptics = HapticThread::spawn(scope, device, end, settings, RATE).expect("it starts");
+        for due in [1, 10, 30] {
+            let tool = until(&mut simulation, |tool| tool.ticks.due >= due);
+            assert_eq!(tool.ticks.due, 1 + (tool.time * RATE) as u64, "{tool:?}");
+        }
+    });
+}
+
 #[test]
 fn goes_on_after_errors() {
     let mut link = HapticLink::new();

@@ -253,7 +253,7 @@ impl ForceLaw {
         let torque = limited_step(self.wrench.torque, torque, self.settings.max_torque_step);
         self.forces.stepped(force.distance(self.wrench.force));
         self.wrench = Wrench { force, torque };
-        most != force && most.length_squared() > force.length_squared()
+        most.length_squared() > force.length_squared()
     }
 }
 

@@ -196,6 +196,22 @@ fn models_that_follow_do_not_hurry_what_comes_in() {
     }
 }
 
+/// A tool that breaks in while forces fade meets what is left of them, as fast as steps allow.
+#[test]
+fn a_force_that_fades_does_not_come_in_anew() {
+    let mut law = law();
+    rest(&mut law, 1, 400);
+    let step = |law: &mut ForceLaw, tick: u64, depth: f32| {
+        let sample = DeviceSample::at(Vec3::Y * -depth);
+        law.step(tick as f64 * PERIOD, &sample, (399, &WALL)).force.y
+    };
+    (400..500).for_each(|tick| _ = step(&mut law, tick, 2e-3));
+    let forces: Vec<f32> = (500..510).map(|tick| step(&mut law, tick, 6e-3)).collect();
+    let share = law.watchdog.share(509.0 * PERIOD);
+    assert!((0.3..0.7).contains(&share) && smooth(&forces), "{forces:?}");
+    assert!((forces[9] - 6.0 * share).abs() < 1e-3, "{forces:?}, of which {share} are left");
+}
+
 /// However long a device could not be read: as many ticks as can be counted.
 #[test]
 fn a_device_that_is_back_after_weeks_is_felt() {

@@ -103,6 +103,7 @@ mod tests {
 
     use super::*;
     use crate::behavior::drill::Burr;
+    use crate::behavior::piece::Piece;
     use crate::behavior::{Behavior, Bone, Fixed, Input};
     use crate::geometry::{Geometry, Rigid, Volume};
     use crate::interaction::{Member, Segment};
@@ -133,7 +134,11 @@ mod tests {
 
     /// What a bit 1 mm deep in flat bone does to the tool and to the bone.
     fn respond(tool: Object) -> [Impulses; 2] {
-        let (bone, mut touches) = (bone(), Touches::default());
+        respond_on(tool, bone())
+    }
+
+    fn respond_on(tool: Object, bone: Object) -> [Impulses; 2] {
+        let mut touches = Touches::default();
         BurrInBone.detect(&tool, &bone, &mut touches);
         let mut impulses: [Impulses; 2] = Default::default();
         let [first, second] = &mut impulses;
@@ -170,6 +175,18 @@ mod tests {
         let back = reaction(&mut on_bone);
         assert!((back.force + felt.force).length() < 1e-5);
         assert_eq!(back.elastic, Vec3::ZERO);
+    }
+
+    /// A light piece goes a third of the depth in a frame, for its force rises by the power of 3/2 of that.
+    #[test]
+    fn a_free_piece_goes_a_third_of_the_way() {
+        let mut piece = bone();
+        let behavior = Piece::new(piece.geometry.as_volume().expect("bone")).loose();
+        let lightness = behavior.body().inverse_mass();
+        piece.behavior = Box::new(behavior);
+        let [_, mut on_piece] = respond_on(tool(Bit::BURR, Vec3::X, 0.0), piece);
+        let way = reaction(&mut on_piece).force.length() * lightness * TIME * TIME;
+        assert!((0.30e-3..0.34e-3).contains(&way), "{way} m of 1 mm");
     }
 
     #[test]

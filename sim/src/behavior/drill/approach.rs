@@ -61,3 +61,29 @@ impl Approach {
         self.entry.into_iter().flat_map(|entry| [entry.normal, entry.place])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::behavior::drill::Bit;
+
+    /// The way back is remembered in and across to two radii each, and forgotten on the way out.
+    #[test]
+    fn remembers_where_a_bit_came_from() {
+        let bit = Bit::BURR;
+        let mut approach = Approach::default();
+        let path = [
+            ([0.0, 0.0], [0.0, 0.0]),
+            ([0.5, -1.0], [0.0, 0.0]),
+            ([9.0, -9.0], [7.0, -7.0]),
+            ([9.0, -5.0], [7.0, -5.0]),
+        ];
+        for (to, from) in path {
+            let [center, from] = [to, from].map(|[x, y]| Vec3::new(x, y, 0.0) * bit.radius);
+            let burr = Burr { bit, center, axis: Vec3::Z, spin: 0.0, side: None };
+            approach.follow(&burr, Some(Vec3::Y));
+            let place = approach.state().last().expect("it touches bone");
+            assert!(place.distance(from) < 1e-6, "{place}, not {from}");
+        }
+    }
+}

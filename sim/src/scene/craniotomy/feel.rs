@@ -355,3 +355,7 @@ fn sum(first: LocalModel, other: LocalModel) -> LocalModel {
 #[cfg(test)]
 #[path = "feel_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "feel_silence_tests.rs"]
+mod silence_tests;

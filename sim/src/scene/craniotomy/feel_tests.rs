@@ -1,7 +1,3 @@
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{scope, sleep};
-use std::time::Duration;
-
 use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
@@ -15,7 +11,7 @@ use crate::device::link::HapticLink;
 use crate::device::motion::{Keyframe, Motion, ScriptedDevice};
 use crate::device::operator::SimulatedDevice;
 use crate::device::proxy::Surface;
-use crate::device::thread::{HapticLoop, HapticThread, RATE};
+use crate::device::thread::HapticLoop;
 use crate::device::{DeviceDescription, DeviceError, HapticDevice, Wrench};
 use crate::executor::{Executor, SerialExecutor};
 use crate::geometry::{Geometry, Rigid, Volume};
@@ -204,91 +200,6 @@ fn a_device_that_cannot_be_written_leads_its_tool() {
     assert!(place.distance(to) < 1e-6, "{place}");
 }
 
-/// A device at rest that may be pulled out.
-struct Plugged<'a>(DeviceSample, &'a AtomicBool);
-
-impl HapticDevice for Plugged<'_> {
-    fn description(&self) -> DeviceDescription {
-        SimulatedDevice::DESCRIPTION
-    }
-
-    fn read(&mut self, _time: f64) -> Result<DeviceSample, DeviceError> {
-        if self.1.load(Ordering::Relaxed) { Err(DeviceError::Disconnected) } else { Ok(self.0) }
-    }
-
-    fn write(&mut self, _wrench: Wrench) -> Result<(), DeviceError> {
-        Ok(())
-    }
-}
-
-/// A device that is pulled out with its button down: the simulation knows, and after a while its tool lets go.
-#[test]
-fn a_device_that_is_gone_is_told_of_and_lets_go() {
-    let place = LID + Vec3::Z * 0.02;
-    let mut link = HapticLink::new();
-    let (end, simulation) = link.split();
-    let is_gone = AtomicBool::new(false);
-    let device = Plugged(DeviceSample { buttons: 1, ..DeviceSample::at(place) }, &is_gone);
-    let mut feel = Feel::new(simulation);
-    let mut ticking = HapticLoop::new(device, end, ForceSettings::default());
-    assert_eq!(feel.sample(), None, "nothing was said");
-    assert_eq!(feel.told(), None);
-    ticking.tick(0.1);
-    let pressed = feel.sample().expect("it was said where the device is");
-    assert_eq!((pressed.buttons, feel.told().and_then(|told| told.fault)), (1, None));
-    is_gone.store(true, Ordering::Relaxed);
-    ticking.tick(0.2);
-    assert_eq!(feel.sample(), Some(pressed), "for a tick that is missed nobody lets go");
-    assert_eq!(feel.told().and_then(|told| told.fault), Some(DeviceError::Disconnected));
-    ticking.tick(0.2 + 0.9 * LETS_GO);
-    assert_eq!(feel.sample(), Some(pressed), "nor for some");
-    ticking.tick(0.2 + 1.1 * LETS_GO);
-    assert_eq!(feel.sample(), Some(DeviceSample { buttons: 0, ..pressed }));
-    is_gone.store(false, Ordering::Relaxed);
-    ticking.tick(0.6);
-    assert_eq!(feel.sample(), Some(pressed), "it is there again");
-}
-
-/// A driver that hangs, or a loop that was stopped, with the button down: after 0.25 s of frames the tool lets go.
-#[test]
-fn a_loop_that_says_nothing_lets_go() {
-    let mut link = HapticLink::new();
-    let (end, simulation) = link.split();
-    let is_gone = AtomicBool::new(false);
-    let device = Plugged(DeviceSample { buttons: 1, ..DeviceSample::at(LID) }, &is_gone);
-    let mut feel = Feel::new(simulation);
-    let mut ticking = HapticLoop::new(device, end, ForceSettings::default());
-    for tick in 1..=2 {
-        ticking.tick(f64::from(tick));
-        let buttons: Vec<u32> =
-            (0..20).map(|_| feel.sample().expect("it was said").buttons).collect();
-        assert_eq!(buttons[..15], [1; 15], "for a slow tick nobody lets go");
-        assert_eq!(buttons[16..], [0; 4]);
-    }
-}
-
-/// A loop that was stopped with the button down is told of.
-#[test]
-fn a_loop_that_was_stopped_is_told_of() {
-    let mut link = HapticLink::new();
-    let (end, simulation) = link.split();
-    let is_gone = AtomicBool::new(false);
-    let device = Plugged(DeviceSample { buttons: 1, ..DeviceSample::at(LID) }, &is_gone);
-    let mut feel = Feel::new(simulation);
-    scope(|scope| {
-        let settings = ForceSettings::default();
-        let haptics = HapticThread::spawn(scope, device, end, settings, RATE).expect("it starts");
-        while feel.sample().is_none_or(|sample| sample.buttons == 0) {
-            sleep(Duration::from_millis(1));
-        }
-        assert!(feel.told().is_some_and(|told| told.is_fresh));
-        drop(haptics);
-        let last = (0..20).map(|_| feel.sample()).last().flatten();
-        assert_eq!(last, Some(DeviceSample::at(LID)), "its tool has let go");
-    });
-    assert!(feel.told().is_some_and(|told| !told.is_fresh && told.ticks.due > 0));
-}
-
 /// Bone that is drawn no more, since it was removed or hidden, neither pushes a hand nor holds its tool out.
 #[test]
 fn what_is_not_drawn_is_not_felt() {
@@ -392,4 +303,72 @@ fn a_flap_that_comes_free_under_a_hand_is_felt() {
 fn a_sum_is_as_old_as_its_oldest_part() {
     let [new, old] = [2.0, 1.0].map(|time| LocalModel { time, ..LocalModel::FREE });
     assert_eq!((sum(new, old).time, sum(old, new).time), (1.0, 1.0));
+}
+
+/// A hand that has felt nothing yet, with its device at rest at the origin.
+fn untouched(link: &mut HapticLink) -> (Feel<'_>, ToolState) {
+    let (_, simulation) = link.split();
+    let mut feel = Feel::new(simulation);
+    let device = feel.end.tool();
+    (feel, device)
+}
+
+const COUPLING: Coupling = Coupling { stiffness: 5_000.0, strength: 10.0, normal: Vec3::Z };
+
+/// What is drilled, and what is held but the skull, is where the tool is.
+#[test]
+fn a_tool_passes_through_what_it_drills_or_holds() {
+    let tip = Vec3::X * 0.1;
+    let cases = [
+        (None, Vec3::ZERO, [false, false]),
+        (None, Vec3::Z, [false, true]),
+        (Some(COUPLING), Vec3::ZERO, [true, true]),
+    ];
+    for (coupling, held, expected) in cases {
+        let mut link = HapticLink::new();
+        let (mut feel, _) = untouched(&mut link);
+        let near = |bone| Near { bone, proxy: Proxy::new(Vec3::Y), is_drawn: true };
+        feel.bones = vec![near(SKULL), near(PIECE)];
+        let work = Work { held, ..Work::default() };
+        feel.tool = Some(Seen { tip, work, coupling, push: None });
+        feel.pass_through();
+        let passed: Vec<bool> =
+            feel.bones.iter().map(|near| near.proxy == Proxy::new(tip)).collect();
+        assert_eq!(passed, expected, "{coupling:?}, {held}");
+    }
+}
+
+/// A drill is led beside the device by as much as its tip is from where the hand rested, a millimetre at most, until it
+/// is out of bone.
+#[test]
+fn a_drill_is_led_as_long_as_it_is_in_bone() {
+    for (step, expected) in [(0.5e-3, 0.5e-3), (5e-3, SHIFT), (-5e-3, -SHIFT)] {
+        let mut link = HapticLink::new();
+        let (mut feel, device) = untouched(&mut link);
+        feel.rest = Some(Vec3::ZERO);
+        feel.drilled(Vec3::Z * step, COUPLING, &device);
+        let shift = feel.shift.expect("it is led");
+        assert!(shift.distance(Vec3::Z * expected) < 1e-9, "{shift} for {step} m");
+        let seen =
+            Seen { tip: Vec3::ZERO, work: Work::default(), coupling: None, push: Some(5_000.0) };
+        feel.nearest(&seen, &device);
+        assert_eq!(feel.shift, None);
+    }
+}
+
+/// What was felt of tissue is of a tool that a device led there some frames before.
+#[test]
+fn tissue_is_felt_where_the_device_was() {
+    let mut link = HapticLink::new();
+    let (mut feel, device) = untouched(&mut link);
+    let at = |swap: u8| {
+        let sample = DeviceSample { buttons: 1, ..DeviceSample::at(Vec3::X * f32::from(swap)) };
+        ToolState { sample, time: f64::from(swap), ..device }
+    };
+    feel.past.extend((0..=4).map(at));
+    let work = Work { held: Vec3::X, tissue: Vec3::Z, ..Work::default() };
+    let seen = Seen { tip: Vec3::ZERO, work, coupling: None, push: None };
+    let (held, dura) = (feel.held(&seen, &at(4)), feel.dura(&seen));
+    let of = |model: Option<LocalModel>| model.map(|model| (model.time, model.position.x));
+    assert_eq!((of(held), of(dura)), (Some((1.0, 1.0)), Some((2.0, 2.0))));
 }
