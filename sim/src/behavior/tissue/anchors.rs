@@ -232,7 +232,7 @@ mod tests {
         for (beyond, held) in [(0, 1), (8, 1), (9, 0), (16, 0)] {
             let pin = Pin { node: 0, point: Vec3::ZERO, stiffness: 100.0, strength: 1.0 };
             let mut anchors = Anchors { pins: vec![pin], ..Anchors::default() };
-            anchors.begin(&[1.0], 0.001, 16);
+            anchors.begin(&[1.0], Vec3::ZERO, 0.001, 16);
             anchors.list[0].beyond = beyond;
             anchors.end(0.001, 16);
             assert_eq!(anchors.pins.len(), held, "beyond it in {beyond} substeps of 16");

@@ -1,10 +1,11 @@
 //! What a hand feels: a haptic loop's device moves a tool, and what the tool meets comes back as forces.
 
 use std::collections::VecDeque;
+use std::time::Instant;
 
 use glam::{Mat3, Vec3};
 
-use super::{SKULL, TIME_STEP};
+use super::SKULL;
 use crate::behavior::drill::Coupling;
 use crate::behavior::{Tool, Work};
 use crate::device::link::{SimulationEnd, ToolState};
@@ -18,8 +19,8 @@ use crate::object::{Object, ObjectId};
 const TOUCHED: usize = 2;
 /// Likewise where the tool was when that which it holds was drawn there, which has told since.
 const HELD: usize = 3;
-/// How long a device may not be read before its buttons count as let go of, in seconds of its loop's clock, or of frames
-/// in which the loop says nothing; usually 0.25: a drill whose device was pulled out is not to go on.
+/// How long a device may not be read before its buttons count as let go of, in seconds of its loop's clock, or how long its
+/// loop may say nothing, in seconds; usually 0.25: a drill whose device was pulled out is not to go on.
 const LETS_GO: f64 = 0.25;
 /// How far a drill is led beside the device at most, in metres; usually 1 mm.
 const SHIFT: f32 = 0.001;
@@ -52,8 +53,8 @@ pub(super) struct Feel<'c> {
     told: Option<ToolState>,
     /// From when on swaps found that the device could not be read, in seconds of the loop's clock, if the last one did.
     silent: Option<f64>,
-    /// At how many swaps in a row the loop had said nothing new.
-    still: u32,
+    /// At which swap the loop had last said something new.
+    heard: Instant,
     /// The device at the first look in the frame that is being drawn.
     now: Option<ToolState>,
     /// The device at the last swaps, the last one last.
@@ -98,8 +99,8 @@ impl<'c> Feel<'c> {
         let past = VecDeque::with_capacity(HELD + 2);
         let (now, next, tool, bones, drags) = (None, None, None, Vec::new(), Default::default());
         let (rest, shift, grasp) = (None, None, Vec3::ZERO);
-        let (told, silent, still) = (None, None, 0);
-        Self { end, told, silent, still, now, past, next, tool, bones, rest, shift, grasp, drags }
+        let (told, silent, heard) = (None, None, Instant::now());
+        Self { end, told, silent, heard, now, past, next, tool, bones, rest, shift, grasp, drags }
     }
 
     pub(super) fn into_end(self) -> SimulationEnd<'c> {
@@ -200,8 +201,9 @@ impl<'c> Feel<'c> {
 
     /// The loop had said this at a swap.
     fn hear(&mut self, told: &ToolState) {
-        let is_old = self.told.is_some_and(|before| before.time == told.time);
-        self.still = if is_old { self.still.saturating_add(1) } else { 0 };
+        if self.told.is_none_or(|before| before.time != told.time) {
+            self.heard = Instant::now();
+        }
         // Since the first swap at which it was not read: a slow frame is not the device's silence.
         self.silent = if told.is_fresh { None } else { self.silent.or(Some(told.time)) };
         if told.ticks.due > 0 {
@@ -214,7 +216,7 @@ impl<'c> Feel<'c> {
         let is_over = told.fault == Some(DeviceError::Panicked);
         let unread = self.silent.map_or(0.0, |since| told.time - since);
         // The clock of a loop that was stopped, or whose driver hangs, stands still.
-        let unheard = f64::from(self.still) * f64::from(TIME_STEP);
+        let unheard = self.heard.elapsed().as_secs_f64();
         is_over || unread.max(unheard) > LETS_GO
     }
 

@@ -56,7 +56,7 @@ fn a_device_that_is_gone_is_told_of_and_lets_go() {
     assert_eq!(feel.sample(), Some(pressed), "it is there again");
 }
 
-/// A driver that hangs, or a loop that was stopped, with the button down: after 0.25 s of frames the tool lets go.
+/// A driver that hangs, or a loop that was stopped, with the button down: after 0.25 s the tool lets go.
 #[test]
 fn a_loop_that_says_nothing_lets_go() {
     let mut link = HapticLink::new();
@@ -67,10 +67,10 @@ fn a_loop_that_says_nothing_lets_go() {
     let mut ticking = HapticLoop::new(device, end, ForceSettings::default());
     for tick in 1..=2 {
         ticking.tick(f64::from(tick));
-        let buttons: Vec<u32> =
-            (0..20).map(|_| feel.sample().expect("it was said").buttons).collect();
-        assert_eq!(buttons[..15], [1; 15], "for a slow tick nobody lets go");
-        assert_eq!(buttons[16..], [0; 4]);
+        let mut buttons = || feel.sample().expect("it was said").buttons;
+        assert_eq!(buttons(), 1, "after however slow a tick");
+        sleep(Duration::from_secs_f64(1.2 * LETS_GO));
+        assert_eq!(buttons(), 0);
     }
 }
 
@@ -90,8 +90,9 @@ fn a_loop_that_was_stopped_is_told_of() {
         }
         assert!(feel.told().is_some_and(|told| told.is_fresh));
         drop(haptics);
-        let last = (0..20).map(|_| feel.sample()).last().flatten();
-        assert_eq!(last, Some(DeviceSample::at(PLACE)), "its tool has let go");
+        feel.sample();
+        sleep(Duration::from_secs_f64(1.2 * LETS_GO));
+        assert_eq!(feel.sample(), Some(DeviceSample::at(PLACE)), "its tool has let go");
     });
     assert!(feel.told().is_some_and(|told| !told.is_fresh && told.ticks.due > 0));
 }

@@ -179,7 +179,7 @@ impl Hands<'_, '_> {
 
     /// The device of hand number `hand` (0 or 1) at the last swap, with all that its loop has measured, and why it cannot
     /// be read or written, if it cannot: its tool stays where it was then, and after 0.25 s lets go of its buttons, as
-    /// after 0.25 s of frames in which the loop says nothing, since it was stopped or its driver hangs. None where no
+    /// after 0.25 s in which the loop says nothing, since it was stopped or its driver hangs. None where no
     /// loop is linked, or none has said anything yet.
     #[must_use]
     pub fn device(&self, hand: usize) -> Option<ToolState> {
