@@ -97,7 +97,7 @@ impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
         })
     }
 
-    /// The next letter posted to this unit before this frame, by (sender, sequence).
+    /// The next letter posted to this unit before this frame, in the order of [`From::is_before`].
     pub fn next_letter(&mut self) -> Option<(From, E::Message)> {
         self.mail.next()
     }

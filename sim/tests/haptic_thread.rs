@@ -97,7 +97,8 @@ fn a_loop_that_is_stopped_says_so() {
     let place = Motion::at_rest(Vec3::X).expect("finite");
     let device = SimulatedDevice::new(Hand::FIRM, place);
     scope(|scope| {
-        let settings = ForceSettings::default();
+        // However long this thread is held up, the force does not fade.
+        let settings = ForceSettings { timeout: 1e9, ..ForceSettings::default() };
         let haptics = HapticThread::spawn(scope, device, end, settings, RATE).expect("it starts");
         let force = Vec3::Y * 5.0;
         simulation.deliver(LocalModel { force, ..LocalModel::FREE }).expect("finite");

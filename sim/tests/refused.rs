@@ -2,6 +2,8 @@
 #![forbid(unsafe_code)]
 
 #[cfg(unix)]
+use std::sync::Mutex;
+#[cfg(unix)]
 use std::thread;
 
 use dualframe_sim::blocking::Grain;
@@ -87,11 +89,15 @@ fn without_memory_for_threads() {
 fn without_memory_for_one_thread_more() {
     let expected = run(scene(), SERIAL).state_hash();
     // Those that were joined are gone, which a pool's may be only later.
+    let gate = Mutex::new(());
     let most = thread::scope(|scope| {
-        let waits = || thread::Builder::new().spawn_scoped(scope, thread::park);
+        let closed = gate.lock().expect("nobody panics");
+        let waits = || thread::Builder::new().spawn_scoped(scope, || drop(gate.lock()));
         let waiting: Vec<_> = std::iter::from_fn(|| waits().ok()).collect();
-        waiting.iter().for_each(|thread| thread.thread().unpark());
-        waiting.len()
+        drop(closed);
+        let most = waiting.len();
+        waiting.into_iter().for_each(|thread| thread.join().expect("it only waits"));
+        most
     });
     // With all that there can be in its pool, nobody is left to compute beside who renders.
     let settings = settings(ExecutorKind::RayonOverlapped, most);

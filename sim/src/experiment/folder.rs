@@ -16,7 +16,12 @@ const PART: &str = "part";
 /// # Errors
 /// It is not there, or takes none.
 pub fn check(folder: &Path) -> Result<(), ExperimentError> {
-    let part = part_of(&folder.join(PAGE));
+    let page = folder.join(PAGE);
+    if page.is_dir() {
+        let source = io::ErrorKind::IsADirectory.into();
+        return Err(ExperimentError::Write { path: page, source });
+    }
+    let part = part_of(&page);
     let written = write_new(&part, b"?");
     let removed = fs::remove_file(&part);
     written

@@ -227,6 +227,7 @@ mod tests {
         assert_eq!(lost.usual(), 2);
         assert_eq!(marked(&[lost]), "3 of 3 runs were marked; 1 of the 1 shown are.");
     }
+
     #[test]
     fn a_figure_says_how_far_workers_differ_at_most() {
         let balances = [balance(&[0.3, 0.0001, 0.00141], &[]), balance(&[0.0005], &[])];

@@ -97,16 +97,16 @@ fn a_loop_that_was_stopped_is_told_of() {
     assert!(feel.told().is_some_and(|told| !told.is_fresh && told.ticks.due > 0));
 }
 
-/// A driver that panics once it was read, with the button down.
-struct Panicking;
+/// A driver that panics when it is told to, with the button down.
+struct Panicking<'a>(&'a AtomicBool);
 
-impl HapticDevice for Panicking {
+impl HapticDevice for Panicking<'_> {
     fn description(&self) -> DeviceDescription {
         SimulatedDevice::DESCRIPTION
     }
 
-    fn read(&mut self, time: f64) -> Result<DeviceSample, DeviceError> {
-        assert!(time < 0.02, "it panics");
+    fn read(&mut self, _time: f64) -> Result<DeviceSample, DeviceError> {
+        assert!(!self.0.load(Ordering::Relaxed), "it panics");
         Ok(DeviceSample { buttons: 1, ..DeviceSample::at(PLACE) })
     }
 
@@ -120,11 +120,15 @@ impl HapticDevice for Panicking {
 fn a_driver_that_panicked_lets_go_at_once() {
     let mut link = HapticLink::new();
     let (end, simulation) = link.split();
+    let panics = AtomicBool::new(false);
     let mut feel = Feel::new(simulation);
     scope(|scope| {
-        let settings = ForceSettings::default();
-        let _haptics =
-            HapticThread::spawn(scope, Panicking, end, settings, RATE).expect("it starts");
+        let (settings, device) = (ForceSettings::default(), Panicking(&panics));
+        let _haptics = HapticThread::spawn(scope, device, end, settings, RATE).expect("it starts");
+        while feel.sample().is_none_or(|sample| sample.buttons == 0) {
+            sleep(Duration::from_millis(1));
+        }
+        panics.store(true, Ordering::Relaxed);
         let mut first_after = || {
             let sample = feel.sample();
             let fault = feel.told().and_then(|told| told.fault);
