@@ -32,6 +32,8 @@ pub(super) struct Pictures<'a> {
     /// Whether frames are drawn of which no picture is wanted.
     draws_every: bool,
     sequence: Option<Sequence>,
+    /// Whether any frame was drawn.
+    has_drawn: bool,
     failure: Option<GraphicsError>,
     told: &'a Told,
 }
@@ -66,6 +68,7 @@ impl<'a> Pictures<'a> {
             last: frames - 1,
             draws_every: args.offscreen,
             sequence: sequence?,
+            has_drawn: false,
             failure: None,
             told,
         }))
@@ -75,9 +78,11 @@ impl<'a> Pictures<'a> {
         self.draws_every || self.sequence.is_some() || self.frame == self.last
     }
 
-    /// Writes what is still to be written, the last frame's picture to `picture`.
+    /// Writes what is still to be written, the last frame's picture to `picture`; none of a run that was broken off
+    /// before any frame was drawn, which would be empty.
     pub(super) fn finish(mut self, picture: Option<&Output>) {
         self.end_sequence();
+        let picture = picture.filter(|_| self.has_drawn);
         let last = match self.failure.or_else(|| self.offscreen.painter.failure()) {
             Some(failure) => Err(failure.into()),
             None => picture.map_or(Ok(()), |file| write(self.offscreen.picture(), file)),
@@ -102,6 +107,7 @@ impl Renderer for Pictures<'_> {
     fn swap(&mut self, frame: u64) {
         if self.is_wanted() {
             self.offscreen.swap(frame);
+            self.has_drawn = true;
             if let Some(sequence) = &self.sequence
                 && self.failure.is_none()
             {

@@ -41,6 +41,8 @@ impl ReplayFault {
     /// The status that the program ends with if nothing is played.
     pub(super) fn status(&self) -> u8 {
         match self {
+            // More objects than the broad phase asked for allows.
+            Self::Executor(ExecutorError::Blocking(_)) => BAD_ARGUMENT,
             // As for any other run: no thread was to be had, say.
             Self::Executor(_) => UNSOUND,
             _ => BAD_ARGUMENT,

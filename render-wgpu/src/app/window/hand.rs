@@ -76,6 +76,11 @@ pub(in crate::app) trait Hand: Send {
     /// Another environment is shown.
     fn forget(&mut self);
 
+    /// Nobody is at the window any more; frames go on. By default there is nothing more to let go of.
+    fn leave(&mut self) {
+        self.forget();
+    }
+
     /// The left button went down.
     fn press(&mut self, aim: &Aim<'_>);
 

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use egui::{Context, Order, Pos2};
 use egui_winit::State;
 use glam::Vec2;
 use winit::application::ApplicationHandler;
@@ -51,7 +52,8 @@ pub(super) struct Input {
     pub(super) gestures: Vec<Gesture>,
     /// Where the mouse is, in pixels from the upper left.
     pub(super) cursor: Vec2,
-    held: Option<MouseButton>,
+    /// The buttons that are down, the last one last.
+    held: Vec<MouseButton>,
 }
 
 impl Input {
@@ -64,13 +66,14 @@ impl Input {
             is_closing: false,
             gestures: Vec::new(),
             cursor: Vec2::ZERO,
-            held: None,
+            held: Vec::new(),
         }
     }
 
     fn press(&mut self, state: ElementState, button: MouseButton) {
         let is_down = state == ElementState::Pressed;
-        self.held = is_down.then_some(button);
+        self.held.retain(|&held| held != button);
+        self.held.extend(is_down.then_some(button));
         if button == MouseButton::Left {
             self.gestures.push(if is_down {
                 Gesture::Press(self.cursor)
@@ -100,6 +103,14 @@ impl Input {
     }
 }
 
+/// Whether what the mouse does here, in pixels, is done in the overlay. What that itself says is of where the mouse was in
+/// the last picture, which may be a second old.
+fn is_overlays(overlay: &Context, cursor: Vec2) -> bool {
+    let place = Pos2::from(cursor.to_array()) / overlay.pixels_per_point();
+    let layer = overlay.layer_id_at(place);
+    overlay.egui_is_using_pointer() || layer.is_some_and(|layer| layer.order != Order::Background)
+}
+
 impl ApplicationHandler for Input {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
         if self.window.is_some() {
@@ -118,19 +129,31 @@ impl ApplicationHandler for Input {
 
     fn window_event(&mut self, _: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         let Some(window) = &self.window else { return };
+        let cursor = self.cursor;
         let is_taken = self.egui.as_mut().is_some_and(|egui| {
             let response = egui.on_window_event(window, &event);
-            response.consumed
+            match event {
+                WindowEvent::MouseInput { .. } | WindowEvent::MouseWheel { .. } => {
+                    is_overlays(egui.egui_ctx(), cursor)
+                }
+                _ => response.consumed,
+            }
         });
         match event {
             WindowEvent::CloseRequested => self.is_closing = true,
             WindowEvent::Destroyed => self.failure = Some("the window was destroyed".to_owned()),
             WindowEvent::Resized(size) => self.size = size,
+            // A button may go up where this window does not hear of it.
+            WindowEvent::Focused(false) => {
+                self.held.clear();
+                self.gestures.push(Gesture::Release);
+            }
             WindowEvent::CursorMoved { position, .. } => {
                 let cursor = Vec2::new(position.x as f32, position.y as f32);
                 let moved = cursor - std::mem::replace(&mut self.cursor, cursor);
                 // What began outside the overlay stays outside it.
-                self.gestures.extend(self.held.map(|button| Gesture::Drag(button, moved)));
+                let held = self.held.last();
+                self.gestures.extend(held.map(|&button| Gesture::Drag(button, moved)));
             }
             WindowEvent::MouseInput { state, button, .. }
                 if !is_taken || state == ElementState::Released =>
@@ -149,5 +172,28 @@ impl ApplicationHandler for Input {
             }
             _ => {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_button_that_is_still_down_drags_on() {
+        let mut input = Input::new((640, 360));
+        let mut press = |is_down: bool, button| {
+            input.press(
+                if is_down { ElementState::Pressed } else { ElementState::Released },
+                button,
+            );
+            input.held.last().copied()
+        };
+        assert_eq!(press(true, MouseButton::Right), Some(MouseButton::Right));
+        assert_eq!(press(true, MouseButton::Left), Some(MouseButton::Left));
+        assert_eq!(press(false, MouseButton::Left), Some(MouseButton::Right));
+        assert_eq!(press(true, MouseButton::Right), Some(MouseButton::Right), "unheard of before");
+        assert_eq!(press(false, MouseButton::Right), None);
+        assert_eq!(input.gestures, [Gesture::Press(Vec2::ZERO), Gesture::Release]);
     }
 }

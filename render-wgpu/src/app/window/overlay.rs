@@ -43,6 +43,8 @@ impl Overlay {
             .default_pos([12.0, 12.0])
             .default_width(300.0)
             .resizable(false)
+            // Where the window is lower than this is, or its pixels are small.
+            .vscroll(true)
             .show(ui.ctx(), |ui| {
                 figures(ui, stats);
                 charts::frame_times(ui, stats);

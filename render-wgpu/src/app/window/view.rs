@@ -158,7 +158,7 @@ impl<H: Hand> View<H> {
     /// held.
     pub(super) fn leave(&mut self) {
         self.act(Gesture::Release);
-        self.hand.forget();
+        self.hand.leave();
         self.controls.is_paused = false;
         self.window.set_visible(false);
     }

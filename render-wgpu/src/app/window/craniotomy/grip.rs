@@ -55,8 +55,8 @@ pub(in crate::app) struct ToolGrip<'c> {
     /// Whether no script moves the hands.
     pub(super) is_free: bool,
     pub(super) score: Report,
-    /// What was chosen in the overlay, and not yet told.
-    chosen: Option<Instrument>,
+    /// What was chosen for each hand, and not yet told.
+    chosen: Each<Option<Instrument>>,
     /// Whether the plan is shown.
     pub(super) is_planned: bool,
 }
@@ -72,7 +72,7 @@ impl<'c> ToolGrip<'c> {
             distance: None,
             is_free,
             score: Report::default(),
-            chosen: None,
+            chosen: Default::default(),
             is_planned: is_free,
         }
     }
@@ -83,10 +83,12 @@ impl<'c> ToolGrip<'c> {
 
     /// Takes up what was chosen.
     fn take_up(&mut self, mailbox: &Mailbox) {
-        if let Some(instrument) = self.chosen.take()
-            && self.held().take_up(instrument)
-        {
-            mailbox.post(TOOLS[self.active], Message::TakeUp(instrument));
+        for ((chosen, held), tool) in self.chosen.iter_mut().zip(&mut self.hands).zip(TOOLS) {
+            if let Some(instrument) = chosen.take()
+                && held.take_up(instrument)
+            {
+                mailbox.post(tool, Message::TakeUp(instrument));
+            }
         }
     }
 
@@ -98,7 +100,7 @@ impl<'c> ToolGrip<'c> {
 
     /// What the hand that the mouse leads is to take up.
     pub(super) fn choose(&mut self, instrument: Instrument) {
-        self.chosen = Some(instrument);
+        self.chosen[self.active] = Some(instrument);
     }
 }
 
@@ -108,10 +110,16 @@ impl Hand for ToolGrip<'_> {
 
     fn forget(&mut self) {
         self.hands = Default::default();
-        (self.active, self.chosen) = (0, None);
+        (self.active, self.chosen) = (0, Default::default());
         for (input, &place) in self.devices.inputs.iter_mut().zip(&self.devices.places) {
             input.set(DeviceSample::at(place));
         }
+    }
+
+    fn leave(&mut self) {
+        // Nobody leads it from now on: it stays where it is, and is used no longer.
+        let sample = self.held().let_go();
+        sample.into_iter().for_each(|sample| self.devices.inputs[self.active].set(sample));
     }
 
     fn press(&mut self, aim: &Aim<'_>) {

@@ -116,6 +116,14 @@ impl Held {
         }
     }
 
+    /// The mouse goes for good; what the device says then.
+    pub(super) fn let_go(&mut self) -> Option<DeviceSample> {
+        self.release();
+        let buttons = u32::from(self.is_used());
+        self.sample = self.sample.map(|sample| DeviceSample { buttons, ..sample });
+        self.sample
+    }
+
     /// The mouse goes to the other hand.
     pub(super) fn leave(&mut self) {
         if self.is_pressed() {

@@ -46,6 +46,8 @@ impl Hand for Grip {
     }
 
     fn press(&mut self, aim: &Aim<'_>) {
+        // The release of what was held may have gone elsewhere.
+        self.release(aim);
         let (answer, answered) = channel();
         let asked = Pick::new(aim.point, answer);
         // With the queue full of work nothing is grabbed this time.
