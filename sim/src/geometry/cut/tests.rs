@@ -246,6 +246,41 @@ fn a_cut_along_edges_makes_only_copies() {
 }
 
 #[test]
+fn a_cut_goes_on_where_cuts_have_crossed() {
+    let mut surface = patch();
+    cut(&mut surface, &[[-3.0, 15.2], [50.0, 18.7]]);
+    cut(&mut surface, &[[18.3, -3.0], [23.1, 50.0]]);
+    assert_eq!(pieces(&surface), 4);
+    // Through where they crossed: two of the four are parted.
+    cut(&mut surface, &[[-3.0, -6.32], [46.0, 42.68]]);
+    check(&surface);
+    assert_eq!(pieces(&surface), 6);
+}
+
+#[test]
+fn a_leaning_blade_clips_a_corner_as_an_upright_one_does() {
+    let clip = |lean: [f32; 2]| {
+        let blade = |[x, y]: [f32; 2]| {
+            let at = |z: f32| Vec3::new(x * 1e-3 + lean[0] * z, y * 1e-3 + lean[1] * z, z);
+            Blade { tip: at(-4e-3), heel: at(0.1) }
+        };
+        let mut surface = patch();
+        let sweep = Sweep { before: blade([-3.0, 4.0]), now: blade([6.0, -3.0]) };
+        assert_eq!(surface.cut(sweep, None), None, "the blade has left");
+        check(&surface);
+        assert_eq!(pieces(&surface), 2, "leaning by {lean:?}");
+        surface
+    };
+    let upright = clip([0.0, 0.0]);
+    for lean in [[0.3, 0.0], [0.5, 0.0], [-0.5, 0.0], [0.0, 0.5], [0.0, -0.5], [0.3, -0.2]] {
+        let leaning = clip(lean);
+        assert_eq!(leaning.triangles, upright.triangles, "leaning by {lean:?}");
+        let places = leaning.nodes.iter().zip(&upright.nodes);
+        assert!(places.clone().all(|(a, b)| a.rest.distance(b.rest) < 1e-6), "by {lean:?}");
+    }
+}
+
+#[test]
 fn a_cut_through_nodes_splits_no_edge_there() {
     let mut surface = patch();
     // Straight up through a node of every second row and across the edges between.

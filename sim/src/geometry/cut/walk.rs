@@ -68,8 +68,11 @@ impl CutSurface {
         let mut reached = 0.0;
         let mut front = match start {
             Some(front) => front,
-            None => self.enter(path, &mut reached, None)?,
+            None => self.enter(path, &mut reached, &[])?,
         };
+        // Several pieces may have a node in one place, where cuts crossed that have not opened: those from which nothing
+        // lies ahead.
+        let mut been = Vec::new();
         // No path crosses an edge twice, and no frame makes many new ones; this is so that it ends
         // whatever the surface looks like.
         for _ in 0..4 * self.triangles.len() {
@@ -81,7 +84,8 @@ impl CutSurface {
             } else if self.ends_around(path, front) {
                 return Some(front);
             } else {
-                front = self.enter(path, &mut reached, Some(front))?;
+                been.push(front);
+                front = self.enter(path, &mut reached, &been)?;
             }
         }
         Some(front)
@@ -106,7 +110,7 @@ impl CutSurface {
     /// path has lost, when tissue has moved.
     fn next_from_here(&self, path: &Path, front: u32) -> Option<Crossing> {
         let here = self.position(front);
-        let way = path.to - here;
+        let way = path.across(path.to - here);
         let ahead = |crossing: &Crossing| {
             let point = self.point(crossing);
             let along = (point - here).dot(way);
@@ -115,12 +119,12 @@ impl CutSurface {
         self.first(path, here, self.sides_around(front), ahead)
     }
 
-    /// Where the path comes to the border after a time, which becomes that of coming there: the node
-    /// there.
-    fn enter(&mut self, path: &Path, reached: &mut f64, not_at: Option<u32>) -> Option<u32> {
+    /// Where the path comes to the border after a time, which becomes that of coming there, and at none of the nodes where
+    /// it has been: the node there.
+    fn enter(&mut self, path: &Path, reached: &mut f64, been: &[u32]) -> Option<u32> {
         let sides = self.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-        let sides = sides.filter(|ends| not_at.is_none_or(|node| !ends.contains(&node)));
-        let earliest = (*reached - BEHIND / (path.to - path.from).length()).max(0.0);
+        let sides = sides.filter(|ends| !ends.iter().any(|end| been.contains(end)));
+        let earliest = (*reached - BEHIND / path.across(path.to - path.from).length()).max(0.0);
         let ahead = |crossing: &Crossing| {
             (earliest..=1.0).contains(&crossing.time)
                 && path.reaches(self.point(crossing), crossing.time)
@@ -166,7 +170,7 @@ impl CutSurface {
     /// cross one if it were longer, unless the node is at a border and nothing lies ahead.
     fn ends_around(&self, path: &Path, front: u32) -> bool {
         let here = self.position(front);
-        let way = path.to - here;
+        let way = path.across(path.to - here);
         let ahead = |crossing: &Crossing| (self.point(crossing) - here).dot(way) > 0.0;
         let sides = self.sides_around(front);
         way.length() <= LEAST_WAY || self.first(path, here, sides, ahead).is_some()
@@ -181,9 +185,14 @@ impl Path {
         way.length() > LEAST_WAY && sine > LEAST_SINE * way.length() * self.axis.length()
     }
 
+    /// What of a way is not along the blade: by that a leaning blade comes to a point at a time, whatever the point's height.
+    fn across(&self, way: DVec3) -> DVec3 {
+        way - self.axis * (way.dot(self.axis) / self.axis.length_squared())
+    }
+
     /// When the blade passes a point, as a share of its way.
     fn time(&self, point: DVec3) -> f64 {
-        let way = self.to - self.from;
+        let way = self.across(self.to - self.from);
         (point - self.from).dot(way) / way.length_squared()
     }
 
