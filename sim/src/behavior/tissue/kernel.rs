@@ -11,6 +11,8 @@
 //! Every number is the result of the same IEEE 754 operations in the same order, whatever the
 //! instructions.
 
+use std::array::from_fn;
+
 use glam::Vec3;
 
 use super::super::spring_law::LEAST_SQUARE;
@@ -26,7 +28,7 @@ pub(super) struct Nodes {
     origin: Vec3,
     /// x, y, z in metres, and the inverse mass in 1/kg.
     positions: Vec<Quad>,
-    /// The positions before the substep's corrections.
+    /// The positions before the last substep's corrections.
     predicted: Vec<Quad>,
     /// In metres per second, and 0.
     velocities: Vec<Quad>,
@@ -98,16 +100,18 @@ impl Kernel for Advance<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, _isa: I) {
         let Nodes { positions, predicted, velocities, .. } = self.nodes;
-        let held = [0.0; 4];
+        let rate = 1.0 / self.time;
         for _ in 0..self.substeps {
+            // What the last substep corrected, and this one's prediction, in one go over the nodes.
             for ((position, predicted), velocity) in
                 positions.iter_mut().zip(predicted.iter_mut()).zip(velocities.iter_mut())
             {
-                let fall = if position[3] > 0.0 { &self.fall } else { &held };
-                for axis in 0..4 {
-                    velocity[axis] = velocity[axis] * self.decay + fall[axis];
-                    position[axis] += velocity[axis] * self.time;
-                }
+                // Whole quads at a time: number by number in place it took a quarter longer in all.
+                let (place, moves) = (*position, if position[3] > 0.0 { 1.0 } else { 0.0 });
+                let before = corrected(*velocity, place, *predicted, rate);
+                let now: Quad = from_fn(|axis| before[axis] * self.decay + self.fall[axis] * moves);
+                *position = from_fn(|axis| place[axis] + now[axis] * self.time);
+                *velocity = now;
                 *predicted = *position;
             }
             for block in self.springs.into_iter().flatten() {
@@ -119,16 +123,19 @@ impl Kernel for Advance<'_> {
             for anchor in &mut *self.anchors {
                 anchor.correct(positions);
             }
-            let rate = 1.0 / self.time;
-            for ((position, predicted), velocity) in
-                positions.iter().zip(predicted.iter()).zip(velocities.iter_mut())
-            {
-                for axis in 0..4 {
-                    velocity[axis] += (position[axis] - predicted[axis]) * rate;
-                }
-            }
+        }
+        for ((position, predicted), velocity) in
+            positions.iter().zip(predicted.iter()).zip(velocities.iter_mut())
+        {
+            *velocity = corrected(*velocity, *position, *predicted, rate);
         }
     }
+}
+
+/// A velocity with what corrections came to since a node was predicted; `rate` is the inverse of the time for that.
+#[inline(always)]
+fn corrected(velocity: Quad, position: Quad, predicted: Quad, rate: f32) -> Quad {
+    from_fn(|axis| velocity[axis] + (position[axis] - predicted[axis]) * rate)
 }
 
 /// Corrects the springs of a block: those of length l and rest r move their ends towards each other
