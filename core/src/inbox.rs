@@ -56,8 +56,8 @@ impl<M> Default for LetterSlot<M> {
 pub struct From {
     /// The sender's number, chosen by the host.
     pub sender: u32,
-    /// Counts the sender's letters of a frame; one from outside, who cannot know the frame, counts all of its letters. It
-    /// may wrap: of two letters at a distance below 2^31 the earlier is the first.
+    /// Counts the sender's letters of a frame; one from outside, who cannot know the frame, counts all of its letters.
+    /// It may wrap: of two letters at a distance below 2^31 the earlier is the first.
     pub sequence: u32,
 }
 

@@ -27,9 +27,9 @@
 //!
 //! # Targets
 //!
-//! Any with compare-and-swap on words of 32 bits or more; for others there is the feature `portable-atomic`, by which every
-//! exchange is a critical section (README.md, "Embedding the core", says what that crate is to be told). Where adding
-//! to a word takes a loop (Armv7-M, Armv8.0 without LSE), or a critical section, what is wait-free elsewhere is
+//! Any with compare-and-swap on words of 32 bits or more; for others there is the feature `portable-atomic`, by which
+//! every exchange is a critical section (README.md, "Embedding the core", says what that crate is to be told). Where
+//! adding to a word takes a loop (Armv7-M, Armv8.0 without LSE), or a critical section, what is wait-free elsewhere is
 //! lock-free or waits for that.
 //!
 //! # One idea

@@ -58,9 +58,10 @@ impl Default for Config {
 /// ([`size_of`] says how many for a target), which a small stack had better not be the place of.
 ///
 /// A worker that is lost in mid-work (its callback panicked, it was forgotten, its task deleted) keeps the frames from
-/// ever being done. A new pipeline over the same memory is sound then, and is the way to other numbers of units, too: it
-/// begins with frame 0, without the letters of before, which [`take_letters`](Self::take_letters) hands over, and with
-/// the states of modelled interactions as they are. Memory that was lent for good (`&'static mut`) cannot be lent again.
+/// ever being done. A new pipeline over the same memory is sound then, and is the way to other numbers of units, too:
+/// it begins with frame 0, without the letters of before, which [`take_letters`](Self::take_letters) hands over, and
+/// with the states of modelled interactions as they are. Memory that was lent for good (`&'static mut`) cannot be lent
+/// again.
 pub struct Pipeline<'m, E: Environment, W: Waiting = Spin> {
     pub(crate) tables: Tables<'m, E>,
     pub(crate) window: Window,

@@ -132,3 +132,45 @@ fn frames_wrap() {
         }
     }
 }
+
+/// Of the memory of one in which a worker was lost after so many steps, with what it carried.
+#[test]
+fn another_pipeline_may_have_the_memory_of_one_that_never_ends() {
+    for broad_phase in [BroadPhase::Spatial, BroadPhase::Pairwise] {
+        let config = Config { broad_phase, ..Config::default() };
+        let mut units = [(); 2].map(|()| UnitSlot::new(Body(Frame(0))));
+        let mut modelled = [InteractionSlot::between(UnitId(0), UnitId(1), None)];
+        let mut spare = [const { InteractionSlot::spare(None) }; 2];
+        let mut contacts = [const { ContactSlot::new() }; 2];
+        let mut segments = [const { SegmentSlot::new() }; 2];
+        let mut letters = [const { LetterSlot::new() }; 4];
+        let mut queues = [const { QueueSlot::new() }; queue_slots(2, 2, 4, 1)];
+        let mut ended = 0;
+        for lost_after in (0..30).chain([1_000]) {
+            let memory = Memory {
+                units: &mut units,
+                interactions: match broad_phase {
+                    BroadPhase::Spatial => &mut spare[..],
+                    BroadPhase::Pairwise => &mut modelled[..],
+                },
+                contacts: &mut contacts,
+                segments: &mut segments,
+                letters: &mut letters,
+                queues: &mut queues,
+            };
+            let mut pipeline =
+                Pipeline::new(memory, config, Spin).unwrap_or_else(|error| panic!("{error}"));
+            pipeline.objects_mut().for_each(|body| *body = Body(Frame(0)));
+            assert_eq!(pipeline.run(4), Ok(()));
+            let calendar = Calendar { first: Frame(0) };
+            let mut worker = pipeline.worker();
+            assert!(pipeline.token(Frame(0)).is_ok_and(|token| worker.hold(token).is_ok()));
+            for _ in 0..lost_after {
+                let _did = worker.step(&calendar).unwrap_or_else(|full| panic!("{full}"));
+            }
+            ended += u32::from(pipeline.finished());
+            ::core::mem::forget(worker);
+        }
+        assert!((1..30).contains(&ended), "{ended}: the last one ends, and not all do");
+    }
+}

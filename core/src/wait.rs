@@ -46,9 +46,9 @@ pub trait Waiting: Sync {
     fn wake(&self, bell: &Bell, count: u32);
 }
 
-/// Waits by looking again and again: for a host that has a core to itself for each worker. One that steps several in turn
-/// on one core, or one of them in an interrupt above others, must not let any of them [wait](crate::worker::Worker::wait)
-/// in this way: who could ring is never reached.
+/// Waits by looking again and again: for a host that has a core to itself for each worker. One that steps several in
+/// turn on one core, or one of them in an interrupt above others, must not let any of them
+/// [wait](crate::worker::Worker::wait) in this way: who could ring is never reached.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Spin;
 

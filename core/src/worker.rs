@@ -26,8 +26,8 @@ pub enum Step {
 
 /// A worker, driven by its host: in a thread, a task, an interrupt-driven loop, a simulator.
 ///
-/// Dropping it is leaving: what it carries goes to the queues, and the others carry on. One that holds a token drops that
-/// and the renderer, too; then nothing is rendered until another holds one.
+/// Dropping it is leaving: what it carries goes to the queues, and the others carry on. One that holds a token drops
+/// that and the renderer, too; then nothing is rendered until another holds one.
 #[must_use = "dropping it is leaving"]
 pub struct Worker<'p, 'm, E: Environment, W: Waiting = Spin, P: Probe = NoProbe> {
     carry: Carry<'p, 'm, E, W>,
