@@ -67,8 +67,8 @@ fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
         others.iter().map(|other| format!("  {:>16}", other.executor.name())).collect();
     println!(
         "\n{}: medians over good rounds (all if none is good); ceiling: what {} independent environments gain, \
-         the median of {GAIN_ROUNDS} measurements after the race, disturbed ones too; least: over the one that it is least \
-         ahead of",
+         the median of {GAIN_ROUNDS} measurements after the race, disturbed ones too; least: over the one that it is \
+         least ahead of",
         pipeline.label(),
         arguments.threads
     );

@@ -82,6 +82,10 @@ impl<'a> Pictures<'a> {
     /// before any frame was drawn, which would be empty.
     pub(super) fn finish(mut self, picture: Option<&Output>) {
         self.end_sequence();
+        if picture.is_some() && !self.has_drawn {
+            self.told
+                .note("no frame was drawn that there could be a picture of: it is left as it was");
+        }
         let picture = picture.filter(|_| self.has_drawn);
         let last = match self.failure.or_else(|| self.offscreen.painter.failure()) {
             Some(failure) => Err(failure.into()),

@@ -59,9 +59,9 @@ pub trait Behavior: Any + Send + Sync {
         false
     }
 
-    /// Makes the behaviour of a snapshot what a renderer may ask of this one; by default it may ask nothing, and that is a
-    /// [`Fixed`]. What it was may be of an earlier frame, or of another object. A panic here ends the run: a picture is
-    /// not an update, of which an object could be excluded.
+    /// Makes the behaviour of a snapshot what a renderer may ask of this one; by default it may ask nothing, and a
+    /// [`Fixed`] says that. What it was may be of an earlier frame, or of another object. A panic here ends the run: a
+    /// picture is not an update, of which an object could be excluded.
     fn show_in(&self, snapshot: &mut Box<dyn Behavior>) {
         *snapshot = Box::new(Fixed);
     }

@@ -51,8 +51,8 @@ impl Scripted {
     /// A path through the keyframes.
     ///
     /// # Errors
-    /// No keyframe at all, keyframes whose frames do not ascend, a position that is not finite, or a rotation that is no
-    /// unit quaternion.
+    /// No keyframe at all, keyframes whose frames do not ascend, a position that is not finite, or a rotation that is
+    /// no unit quaternion.
     pub fn new(keyframes: Vec<Keyframe>) -> Result<Self, ScriptError> {
         if keyframes.is_empty() {
             return Err(ScriptError::Empty);

@@ -174,8 +174,8 @@ impl Study<'_> {
         self.threads.iter().filter_map(point).collect()
     }
 
-    /// How the pipeline does with the most threads, against the serial version and the one of the others that it is least
-    /// ahead of: not always the fastest in the figure, where each is held against the serial version.
+    /// How the pipeline does with the most threads, against the serial version and the one of the others that it is
+    /// least ahead of: not always the fastest in the figure, where each is held against the serial version.
     fn finding(&self, outcome: &Outcome) -> String {
         let threads = self.threads.iter().copied().max().unwrap_or(1);
         let pipeline = Runner::pipeline(threads);

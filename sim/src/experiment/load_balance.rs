@@ -186,8 +186,8 @@ fn figure(balances: &[Balance], frames: u64) -> Result<Figure, ExperimentError> 
         x_label: "objects",
         y_label: "seconds",
         finding: format!(
-            "In the runs shown, the busiest and the idlest worker differ by at most {:.1} %. Of each size one run is shown, {USUAL}, the \
-             workers from left to right; stages have the shares that they have in one frame of 31. {}",
+            "In the runs shown, the busiest and the idlest worker differ by at most {:.1} %. Of each size one run is \
+             shown, {USUAL}, the workers from left to right; stages have the shares that they have in one frame of 31. {}",
             rounded_up(100.0 * greatest, 1),
             marked(balances)
         ),

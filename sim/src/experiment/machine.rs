@@ -67,8 +67,9 @@ impl fmt::Display for Machine {
     }
 }
 
-/// How many cores so many hardware threads are of, as Linux tells: those that name different siblings. Other systems are
-/// not asked. Where more of them may be used, but for a share of the time only, as in a container, nobody can say which.
+/// How many cores so many hardware threads are of, as Linux tells: those that name different siblings. Other systems
+/// are not asked. Where more of them may be used, but for a share of the time only, as in a container, nobody can say
+/// which.
 fn physical_cores(threads: usize) -> Option<usize> {
     let usable = core_affinity::get_core_ids().filter(|usable| usable.len() == threads)?;
     let siblings = usable.into_iter().map(|thread| {

@@ -87,8 +87,8 @@ impl Outcome {
         Some(self.speed_up(self.series.best_rounds(), runner, over)?.median)
     }
 
-    /// What share of the serial version's work rendering is, if `without` is the same race without it: by the medians of
-    /// what it takes in the good rounds of either, or in all where none is good.
+    /// What share of the serial version's work rendering is, if `without` is the same race without it: by the medians
+    /// of what it takes in the good rounds of either, or in all where none is good.
     #[must_use]
     pub fn render_share(&self, without: &Self) -> Option<f64> {
         let seconds = |outcome: &Self| {

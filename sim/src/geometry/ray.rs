@@ -66,7 +66,7 @@ fn cast_mesh(mesh: &Mesh, ray: &Ray, reach: f32) -> Option<f32> {
 }
 
 /// Where a ray enters a box and where it leaves it, in metres along it; `None` if it misses the box or
-/// does not come so far.
+/// does not come so far. Parry's own (`Aabb::clip_ray_parameters`) misses a box without end, as walls have.
 fn crossed(bounds: &Bounds, origin: Vec3, direction: Vec3, reach: f32) -> Option<[f32; 2]> {
     let (mut begin, mut end) = (0.0, reach);
     for axis in 0..3 {

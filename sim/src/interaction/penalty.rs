@@ -15,10 +15,10 @@ use crate::object::Object;
 ///
 /// Where two bodies touch as wholes ([`Contact::BODY`] on both sides) only the spring acts, without damping and friction.
 ///
-/// The force is that of the frame's beginning: with a node's mass m (kg) and the time step t (s) a single node leaves at no
-/// more than 1.25 times the speed at which it came (computed for all depths at which it may first be found) while
-/// stiffness · t² / m + damping · t / m is below 2, and at no more than that speed if the second of these is 0.3 or more;
-/// from 2 on it is thrown, at up to that sum less 1 times its speed.
+/// The force is that of the frame's beginning: with a node's mass m (kg) and the time step t (s) a single node leaves
+/// at no more than 1.25 times the speed at which it came (computed for all depths at which it may first be found)
+/// while stiffness · t² / m + damping · t / m is below 2, and at no more than that speed if the second of these is 0.3
+/// or more; from 2 on it is thrown, at up to that sum less 1 times its speed.
 ///
 /// Between nodes the force acts along the line of their centres on both alike, so without friction
 /// linear and angular momentum are kept up to rounding.

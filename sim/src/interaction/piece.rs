@@ -83,9 +83,9 @@ pub(super) fn free_piece(object: &Object) -> Option<(&Piece, &Volume)> {
 /// Holds a piece off bone that stands still: impulses that let none of its points go farther in, with
 /// Coulomb's friction and without rebound; a point that is inside already is let out slowly.
 ///
-/// They are found by sequential impulses (E. Catto, "Iterative dynamics with temporal coherence", GDC
-/// 2005) from the velocity that the piece has with what gravity and hands will do to it. Each bone finds them as if it were
-/// the only one: a piece that lies on two is held off twice, and may be thrown.
+/// They are found by sequential impulses (E. Catto, "Iterative dynamics with temporal coherence", GDC 2005) from the
+/// velocity that the piece has with what gravity and hands will do to it. Each bone finds them as if it were the only
+/// one: a piece that lies on two is held off twice, and may be thrown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PieceOnBone {
     /// The coefficient of friction; usually 0.4. What is negative or no number is none.

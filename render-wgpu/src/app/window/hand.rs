@@ -76,7 +76,8 @@ pub(in crate::app) trait Hand: Send {
     /// Another environment is shown.
     fn forget(&mut self);
 
-    /// Nobody is at the window any more; frames go on. By default there is nothing more to let go of.
+    /// Nobody is at the window any more, and the button is up; frames go on. By default there is nothing more to let go
+    /// of.
     fn leave(&mut self) {
         self.forget();
     }

@@ -103,8 +103,8 @@ impl Input {
     }
 }
 
-/// Whether what the mouse does here, in pixels, is done in the overlay. What that itself says is of where the mouse was in
-/// the last picture, which may be a second old.
+/// Whether what the mouse does here, in pixels, is done in the overlay. What that itself says is of where the mouse
+/// was in the last picture, which may be a second old.
 fn is_overlays(overlay: &Context, cursor: Vec2) -> bool {
     let place = Pos2::from(cursor.to_array()) / overlay.pixels_per_point();
     let layer = overlay.layer_id_at(place);

@@ -112,8 +112,8 @@ impl Anchors {
         self.grips.retain(|grip| grip.by != by);
     }
 
-    /// Makes the frame's list, for `substeps` of so much `time` and nodes of these inverse masses, whose positions count
-    /// from `origin`.
+    /// Makes the frame's list, for `substeps` of so much `time` and nodes of these inverse masses, whose positions
+    /// count from `origin`.
     pub(super) fn begin(&mut self, inverse_masses: &[f32], origin: Vec3, time: f32, substeps: u32) {
         let anchor = |node: u32, [from, to]: [Vec3; 2], stiffness: f32, strength: f32| {
             let inverse_mass = inverse_masses[node as usize];

@@ -1,12 +1,11 @@
 //! The arithmetic of tissue: a whole frame of one body.
 //!
-//! A substep predicts positions from velocities and gravity, corrects each constraint once (XPBD,
-//! Macklin et al. 2016, with the small steps of Macklin et al. 2019: many substeps of one iteration
-//! beat one step of many iterations), and adds to the velocities what the corrections came to: taken from how far the
-//! nodes came, they would lose in each substep what rounds away in a place (at 1 m and 400 substeps all of gravity). The
-//! constraints' multipliers start from 0 in every substep; with what they were before, which would make
-//! stiff springs stiffer, the forces lag behind the motion and its energy grows (tried: with 0.9 of
-//! them, a sheet of 5 mm edges and 4,330 N/m flies apart).
+//! A substep predicts positions from velocities and gravity, corrects each constraint once (XPBD, Macklin et al. 2016,
+//! with the small steps of Macklin et al. 2019: many substeps of one iteration beat one step of many iterations), and
+//! adds to the velocities what the corrections came to: taken from how far the nodes came, they would lose in each
+//! substep what rounds away in a place (at 1 m and 400 substeps all of gravity). The constraints' multipliers start
+//! from 0 in every substep; with what they were before, which would make stiff springs stiffer, the forces lag behind
+//! the motion and its energy grows (tried: with 0.9 of them, a sheet of 5 mm edges and 4,330 N/m flies apart).
 //!
 //! Every number is the result of the same IEEE 754 operations in the same order, whatever the
 //! instructions.

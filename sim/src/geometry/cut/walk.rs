@@ -70,8 +70,8 @@ impl CutSurface {
             Some(front) => front,
             None => self.enter(path, &mut reached, &[])?,
         };
-        // Several pieces may have a node in one place, where cuts crossed that have not opened: those from which nothing
-        // lies ahead.
+        // Several pieces may have a node in one place, where cuts crossed that have not opened: those from which
+        // nothing lies ahead.
         let mut been = Vec::new();
         // No path crosses an edge twice, and no frame makes many new ones; this is so that it ends
         // whatever the surface looks like.
@@ -119,8 +119,8 @@ impl CutSurface {
         self.first(path, here, self.sides_around(front), ahead)
     }
 
-    /// Where the path comes to the border after a time, which becomes that of coming there, and at none of the nodes where
-    /// it has been: the node there.
+    /// Where the path comes to the border after a time, which becomes that of coming there, and at none of the nodes
+    /// where it has been: the node there.
     fn enter(&mut self, path: &Path, reached: &mut f64, been: &[u32]) -> Option<u32> {
         let sides = self.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
         let sides = sides.filter(|ends| !ends.iter().any(|end| been.contains(end)));
@@ -185,7 +185,8 @@ impl Path {
         way.length() > LEAST_WAY && sine > LEAST_SINE * way.length() * self.axis.length()
     }
 
-    /// What of a way is not along the blade: by that a leaning blade comes to a point at a time, whatever the point's height.
+    /// What of a way is not along the blade: by that a leaning blade comes to a point at a time, whatever the point's
+    /// height.
     fn across(&self, way: DVec3) -> DVec3 {
         way - self.axis * (way.dot(self.axis) / self.axis.length_squared())
     }

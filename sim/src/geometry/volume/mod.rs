@@ -125,10 +125,10 @@ impl Volume {
         Ok(Self { bricks, spacing, pose, velocity: Vec3::ZERO, margin: 0.0 })
     }
 
-    /// As [`Volume::from_fn`], faster where most of a volume is empty, and by several threads: `density` is
-    /// asked in cells where `may_hold` says that there may be something. That is given a cell's first voxel and
-    /// the voxels along each of its sides, which may reach beyond the volume. The threads are Rayon's: from a callback of
-    /// an executor that runs on these, [`Volume::from_fn`] is the one to call.
+    /// As [`Volume::from_fn`], faster where most of a volume is empty, and by several threads: `density` is asked in
+    /// cells where `may_hold` says that there may be something. That is given a cell's first voxel and the voxels
+    /// along each of its sides, which may reach beyond the volume. The threads are Rayon's: from a callback of an
+    /// executor that runs on these, [`Volume::from_fn`] is the one to call.
     ///
     /// # Errors
     /// As [`Volume::new`].

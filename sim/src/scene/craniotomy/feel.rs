@@ -19,8 +19,8 @@ use crate::object::{Object, ObjectId};
 const TOUCHED: usize = 2;
 /// Likewise where the tool was when that which it holds was drawn there, which has told since.
 const HELD: usize = 3;
-/// How long a device may not be read before its buttons count as let go of, in seconds of its loop's clock, or how long its
-/// loop may say nothing, in seconds; usually 0.25: a drill whose device was pulled out is not to go on.
+/// How long a device may not be read before its buttons count as let go of, in seconds of its loop's clock, or how
+/// long its loop may say nothing, in seconds; usually 0.25: a drill whose device was pulled out is not to go on.
 const LETS_GO: f64 = 0.25;
 /// How far a drill is led beside the device at most, in metres; usually 1 mm.
 const SHIFT: f32 = 0.001;

@@ -12,21 +12,27 @@ use crate::device::{DeviceDescription, DeviceError, HapticDevice, Wrench};
 /// Where the device is.
 const PLACE: Vec3 = Vec3::new(0.0, 0.0, 0.07);
 
-/// A device at rest that may be pulled out.
-struct Plugged<'a>(DeviceSample, &'a AtomicBool);
+/// A device at rest with its button down, and what becomes of it when it is told to.
+struct Failing<'a>(&'a AtomicBool, fn() -> DeviceError);
 
-impl HapticDevice for Plugged<'_> {
+impl HapticDevice for Failing<'_> {
     fn description(&self) -> DeviceDescription {
         SimulatedDevice::DESCRIPTION
     }
 
     fn read(&mut self, _time: f64) -> Result<DeviceSample, DeviceError> {
-        if self.1.load(Ordering::Relaxed) { Err(DeviceError::Disconnected) } else { Ok(self.0) }
+        let pressed = DeviceSample { buttons: 1, ..DeviceSample::at(PLACE) };
+        if self.0.load(Ordering::Relaxed) { Err(self.1()) } else { Ok(pressed) }
     }
 
     fn write(&mut self, _wrench: Wrench) -> Result<(), DeviceError> {
         Ok(())
     }
+}
+
+/// It is pulled out.
+fn unplugged() -> DeviceError {
+    DeviceError::Disconnected
 }
 
 /// A device that is pulled out with its button down: the simulation knows, and after a while its tool lets go.
@@ -35,7 +41,7 @@ fn a_device_that_is_gone_is_told_of_and_lets_go() {
     let mut link = HapticLink::new();
     let (end, simulation) = link.split();
     let is_gone = AtomicBool::new(false);
-    let device = Plugged(DeviceSample { buttons: 1, ..DeviceSample::at(PLACE) }, &is_gone);
+    let device = Failing(&is_gone, unplugged);
     let mut feel = Feel::new(simulation);
     let mut ticking = HapticLoop::new(device, end, ForceSettings::default());
     assert_eq!(feel.sample(), None, "nothing was said");
@@ -62,7 +68,7 @@ fn a_loop_that_says_nothing_lets_go() {
     let mut link = HapticLink::new();
     let (end, simulation) = link.split();
     let is_gone = AtomicBool::new(false);
-    let device = Plugged(DeviceSample { buttons: 1, ..DeviceSample::at(PLACE) }, &is_gone);
+    let device = Failing(&is_gone, unplugged);
     let mut feel = Feel::new(simulation);
     let mut ticking = HapticLoop::new(device, end, ForceSettings::default());
     for tick in 1..=2 {
@@ -80,7 +86,7 @@ fn a_loop_that_was_stopped_is_told_of() {
     let mut link = HapticLink::new();
     let (end, simulation) = link.split();
     let is_gone = AtomicBool::new(false);
-    let device = Plugged(DeviceSample { buttons: 1, ..DeviceSample::at(PLACE) }, &is_gone);
+    let device = Failing(&is_gone, unplugged);
     let mut feel = Feel::new(simulation);
     scope(|scope| {
         let settings = ForceSettings::default();
@@ -97,24 +103,6 @@ fn a_loop_that_was_stopped_is_told_of() {
     assert!(feel.told().is_some_and(|told| !told.is_fresh && told.ticks.due > 0));
 }
 
-/// A driver that panics when it is told to, with the button down.
-struct Panicking<'a>(&'a AtomicBool);
-
-impl HapticDevice for Panicking<'_> {
-    fn description(&self) -> DeviceDescription {
-        SimulatedDevice::DESCRIPTION
-    }
-
-    fn read(&mut self, _time: f64) -> Result<DeviceSample, DeviceError> {
-        assert!(!self.0.load(Ordering::Relaxed), "it panics");
-        Ok(DeviceSample { buttons: 1, ..DeviceSample::at(PLACE) })
-    }
-
-    fn write(&mut self, _wrench: Wrench) -> Result<(), DeviceError> {
-        Ok(())
-    }
-}
-
 /// A loop that is over does not come back: its tool lets go at once.
 #[test]
 fn a_driver_that_panicked_lets_go_at_once() {
@@ -123,7 +111,8 @@ fn a_driver_that_panicked_lets_go_at_once() {
     let panics = AtomicBool::new(false);
     let mut feel = Feel::new(simulation);
     scope(|scope| {
-        let (settings, device) = (ForceSettings::default(), Panicking(&panics));
+        let (settings, device) =
+            (ForceSettings::default(), Failing(&panics, || panic!("it panics")));
         let _haptics = HapticThread::spawn(scope, device, end, settings, RATE).expect("it starts");
         while feel.sample().is_none_or(|sample| sample.buttons == 0) {
             sleep(Duration::from_millis(1));

@@ -15,8 +15,8 @@ const FORCE_STEPS: usize = 400;
 /// How far below the inner table the dura lies, and gives way to a bit without harm, in metres; usually
 /// 1 mm: half a millimetre of dura, and what it yields.
 const DURA_GIVES: f32 = 0.001;
-/// How deep a perforator must be in a hole to bore it on, and not to begin another one, in metres; usually 1 mm: what is
-/// less deep is a scratch.
+/// How deep a perforator must be in a hole to bore it on, and not to begin another one, in metres; usually 1 mm: what
+/// is less deep is a scratch.
 const BORED: f32 = 0.001;
 
 /// What is counted while an operation goes on; see [`Operation::report`](super::Operation::report).
@@ -78,8 +78,8 @@ pub struct Report {
     pub dural_tears: u32,
     /// How far they went in it, in metres.
     pub dural_tear_length: f32,
-    /// How the last burr hole was begun; none without one. A perforator that goes back into it, or turns on in it, begins
-    /// no other.
+    /// How the last burr hole was begun; none without one. A perforator that goes back into it, or turns on in it,
+    /// begins no other.
     pub burr_hole: Option<Placement>,
     /// The opening's edge; none before there is one.
     pub margin: Option<Margin>,

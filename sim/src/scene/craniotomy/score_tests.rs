@@ -65,7 +65,8 @@ fn moved(instrument: Instrument, path: &[(f32, bool)]) -> Score {
     scored(instrument, path.iter().map(at))
 }
 
-/// A perforator that is led over the slab for so many frames each, so many metres along it and above it, turning or not.
+/// A perforator that is led over the slab for so many frames each, so many metres along it and above it, turning or
+/// not.
 fn perforated(path: &[(usize, [f32; 2], bool)]) -> Score {
     let at = |&(frames, [x, above], turns): &(usize, [f32; 2], bool)| {
         let place = Vec3::new(x, 0.0, TOP + above);

@@ -118,7 +118,7 @@ impl Hand for ToolGrip<'_> {
 
     fn leave(&mut self) {
         // Nobody leads it from now on: it stays where it is, and is used no longer.
-        let sample = self.held().let_go();
+        let sample = self.held().abandon();
         sample.into_iter().for_each(|sample| self.devices.inputs[self.active].set(sample));
     }
 

@@ -116,9 +116,8 @@ impl Held {
         }
     }
 
-    /// The mouse goes for good; what the device says then.
-    pub(super) fn let_go(&mut self) -> Option<DeviceSample> {
-        self.release();
+    /// The mouse has gone for good, its button up; what the device says then.
+    pub(super) fn abandon(&mut self) -> Option<DeviceSample> {
         let buttons = u32::from(self.is_used());
         self.sample = self.sample.map(|sample| DeviceSample { buttons, ..sample });
         self.sample
@@ -221,6 +220,8 @@ fn outward(place: Vec3) -> Vec3 {
 
 #[cfg(test)]
 mod tests {
+    use dualframe_sim::behavior::Workpieces;
+
     use super::*;
 
     const SKIN: Vec3 = Vec3::new(0.0, 0.1, 0.0);
@@ -307,6 +308,20 @@ mod tests {
         held.release();
         let buttons = held.next(&goal(SKIN)).expect("it opens").buttons;
         assert_eq!(buttons, 0);
+    }
+
+    #[test]
+    fn what_a_hand_uses_is_used_no_longer_when_the_mouse_goes_for_good() {
+        let mut held = held(Instrument::Burr, SKIN);
+        held.press(|anchor| anchor);
+        let pressed = settle(&mut held, &goal(SKIN));
+        held.release();
+        let left = DeviceSample { buttons: 0, ..pressed };
+        assert_eq!((pressed.buttons, held.abandon()), (1, Some(left)));
+        // The tool hears of it two frames later.
+        let (rigid, tool) = Tool::new(Instrument::Burr, pressed, Workpieces::default());
+        assert!(tool.is_pressed());
+        assert_eq!((held.note((&tool, &rigid), true), held.sample), (None, Some(left)));
     }
 
     #[test]
