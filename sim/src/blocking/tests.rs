@@ -1,0 +1,133 @@
+use std::time::Duration;
+
+use glam::Vec3;
+use parry3d::math::Pose;
+use parry3d::shape::SharedShape;
+use proptest::prelude::*;
+
+use super::*;
+use crate::behavior::Fixed;
+use crate::geometry::{Geometry, Rigid};
+use crate::object::{Group, ObjectId};
+use crate::scene::ParticleScene;
+
+/// Deals particles whose updates take so many microseconds, for two workers; for each home what its blocks' updates
+/// take, and how many objects they have.
+fn dealt(micros: &[u64], homes: u32, besides: u64) -> Vec<Vec<(u64, usize)>> {
+    let scene = ParticleScene::new(micros.len()).build().expect("a valid scene");
+    let mut objects = scene.objects;
+    for (object, &micros) in objects.iter_mut().zip(micros) {
+        object.note_cost(Duration::from_micros(micros));
+    }
+    let (mut blocking, mut blocks) =
+        Blocking::new(objects, Grain::Spatial, 2).expect("a valid environment");
+    blocks.iter_mut().for_each(|block| blocking.drain(block));
+    blocking.deal(homes, Duration::from_micros(besides).as_secs_f32());
+    let mut given = vec![Vec::new(); homes as usize];
+    for (index, block) in blocks.iter_mut().enumerate().take(blocking.moving_blocks) {
+        blocking.fill(index, block);
+        let cost = |object: &Object| (object.cost() * 1e6).round() as u64;
+        let objects = block.objects();
+        given[blocking.home(index) as usize].push((objects.iter().map(cost).sum(), objects.len()));
+    }
+    given
+}
+
+fn cost(home: &[(u64, usize)]) -> u64 {
+    home.iter().map(|(cost, _)| cost).sum()
+}
+
+#[test]
+fn homes_take_equally_long_and_begin_with_the_longest() {
+    let micros: Vec<u64> = (1..=30).map(|object| object * object % 97 + 1).collect();
+    let longest = 97;
+    for homes in 1..=4 {
+        let given = dealt(&micros, homes, 0);
+        let share = micros.iter().sum::<u64>() / u64::from(homes);
+        for home in &given {
+            let cost = cost(home);
+            assert!(cost.abs_diff(share) <= longest, "{cost} of {share} µs, {homes} homes");
+            let halves = home.windows(2).filter(|pair| pair[1].0 >= 2 * pair[0].0);
+            assert_eq!(halves.count(), 0, "a long one after a short one: {home:?}");
+        }
+        assert_eq!(given.iter().map(Vec::len).sum::<usize>(), micros.len());
+    }
+}
+
+/// A field of stones in a room, and the blocks that it makes.
+fn scenery(stones: usize, workers: usize) -> Vec<Vec<ObjectId>> {
+    let wall = Rigid::wall(Vec3::ZERO, Vec3::Y);
+    let stone = |index: usize| {
+        let place = Vec3::new((index % 50) as f32, 0.0, (index / 50) as f32);
+        let mut stone = wall.clone();
+        (stone.shape, stone.pose) = (SharedShape::ball(0.2), Pose::from_translation(place));
+        stone
+    };
+    let parts = std::iter::once(wall.clone()).chain((0..stones).map(stone)).enumerate();
+    let object =
+        |(id, part)| Object::new(ObjectId(id as u32), Group(0), Geometry::Rigid(part), Fixed);
+    let grouped = Blocking::new(parts.map(object).collect(), Grain::Spatial, workers);
+    let (_, blocks) = grouped.expect("numbered without gaps");
+    blocks.iter().map(|block| block.objects().iter().map(Object::id).collect()).collect()
+}
+
+#[test]
+fn much_scenery_is_grouped_by_place_and_walls_apart() {
+    for (stones, blocks) in [(0, 1), (SINGLE_OBJECTS, 2), (2_500, 1 + 18)] {
+        let grouped = scenery(stones, 2);
+        assert_eq!(grouped.len(), blocks, "{stones}");
+        assert_eq!(grouped.last(), Some(&vec![ObjectId(0)]), "{stones}");
+        assert_eq!(grouped.iter().map(Vec::len).sum::<usize>(), stones + 1);
+    }
+    for block in scenery(2_500, 2) {
+        let column = |id: &ObjectId| (id.0.max(1) - 1) % 50;
+        let columns = block.iter().map(column);
+        let (least, most) = (columns.clone().min(), columns.max());
+        assert!(most.zip(least).is_some_and(|(most, least)| most - least < 30), "{block:?}");
+    }
+}
+
+#[test]
+fn who_does_something_else_too_is_given_less() {
+    // As if those with great numbers were on a core of half the speed.
+    let micros: Vec<u64> = (0..1_000).map(|object| if object < 500 { 1 } else { 2 }).collect();
+    let total: u64 = micros.iter().sum();
+    // Half of the objects that are dealt out at once, at each of two splits, and what one object takes.
+    let nearly = 2 * (HALF as u64 / 2 + 1) * 2;
+    for besides in [0, 100, 300] {
+        for homes in [2, 3, 4] {
+            let given = dealt(&micros, homes, besides);
+            let share = (total + besides) / u64::from(homes);
+            for (home, expected) in
+                given.iter().zip([share - besides].into_iter().chain(std::iter::repeat(share)))
+            {
+                let cost = cost(home);
+                assert!(cost.abs_diff(expected) <= nearly, "{cost}, not {expected} µs: {given:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn who_has_no_time_left_is_given_little() {
+    let given = dealt(&[1; 300], 2, 1_000_000);
+    assert_eq!(given.iter().map(Vec::len).collect::<Vec<_>>(), [1, 3]);
+    // Half a block's even share, in eights.
+    assert_eq!(cost(&given[0]), 40, "{given:?}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn all_are_dealt_out_to_blocks_of_like_size(
+        micros in proptest::collection::vec(1..100_u64, 1..400),
+        homes in 1..9_u32,
+        besides in 0..20_000_u64,
+    ) {
+        let given = dealt(&micros, homes, besides);
+        prop_assert_eq!(given.iter().map(|home| cost(home)).sum::<u64>(), micros.iter().sum());
+        let sizes: Vec<usize> = given.iter().flatten().map(|&(_, objects)| objects).collect();
+        let even = micros.len().div_ceil(sizes.len()).next_multiple_of(HALF);
+        prop_assert!(sizes.iter().all(|size| (1..=UNEVENNESS * even).contains(size)), "{:?}", given);
+    }
+}
