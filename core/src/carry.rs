@@ -23,6 +23,10 @@ const MOST_CARRIED: usize = 1;
 /// nothing is left but updates that others are at, for which the frame's opening waits. Usually 4.
 const RESERVE: usize = MOST_CARRIED / 8;
 
+/// Renderings that a worker keeps at most until nobody else has the shared renderer. Usually 8: it asks for that ahead of
+/// every step; beyond it they are queued.
+const MOST_KEPT: usize = MOST_CARRIED.div_ceil(4);
+
 /// Carry-over (§4.2): outputs are carried as long as nobody is hungry; and how many sleepers what was
 /// queued is to wake.
 pub(crate) struct Carry<'p, 'm, E: Environment, W: Waiting> {
@@ -31,6 +35,9 @@ pub(crate) struct Carry<'p, 'm, E: Environment, W: Waiting> {
     interactions: Deque<InteractionId, MOST_CARRIED>,
     /// All else, newest first.
     works: Vec<Work, MOST_CARRIED>,
+    /// Units of the frame on display that this worker updated and is to render by the shared renderer, which another
+    /// one had.
+    kept: Vec<UnitId, MOST_KEPT>,
     queued: u32,
     renders: u32,
     /// Whether this worker is counted among the hungry.
@@ -47,6 +54,7 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
             pipeline,
             interactions: Deque::new(),
             works: Vec::new(),
+            kept: Vec::new(),
             queued: 0,
             renders: 0,
             hungry: false,
@@ -57,7 +65,13 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
 
     #[inline]
     pub(crate) fn is_empty(&self) -> bool {
-        self.works.is_empty() && self.interactions.is_empty()
+        !self.has_next() && (self.kept.is_empty() || seeded!(SleepsWithRendering))
+    }
+
+    /// Whether something is carried that this worker can do next, whoever renders.
+    #[inline]
+    fn has_next(&self) -> bool {
+        !self.works.is_empty() || !self.interactions.is_empty()
     }
 
     /// Whether a rendering is carried: on top, then, for only holders can do it.
@@ -73,7 +87,7 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
             return;
         }
         // One work unit is for this worker itself.
-        if (!self.is_empty() && self.pipeline.bells.somebody_is_hungry()) || !self.carry(work) {
+        if (self.has_next() && self.pipeline.bells.somebody_is_hungry()) || !self.carry(work) {
             self.queue(work);
         }
     }
@@ -102,6 +116,19 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         self.renders_shared
     }
 
+    /// Keeps the rendering of `unit`, which this worker has updated for the frame on display, until nobody else has the
+    /// shared renderer; `false` if no renderer is shared, or so many are kept already.
+    #[inline]
+    pub(crate) fn keeps(&mut self, unit: UnitId) -> bool {
+        self.pipeline.shared.is_offered() && self.kept.push(unit).is_ok()
+    }
+
+    /// A rendering that was kept, if this worker has the shared renderer now.
+    #[inline]
+    pub(crate) fn take_kept(&mut self) -> Option<Work> {
+        if self.renders_shared { self.kept.pop().map(Work::Render) } else { None }
+    }
+
     /// Gives what is carried to whoever comes first.
     fn shed(&mut self) {
         while let Some(id) = self.interactions.pop_front() {
@@ -109,6 +136,14 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         }
         while let Some(work) = self.works.pop() {
             self.queue(work);
+        }
+        self.queue_kept();
+    }
+
+    /// Gives the renderings that are kept to whoever comes first.
+    pub(crate) fn queue_kept(&mut self) {
+        while let Some(unit) = self.kept.pop() {
+            self.queue(Work::Render(unit));
         }
     }
 
@@ -204,6 +239,7 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
     pub(crate) fn share_renderer(&mut self) {
         if self.pipeline.shared.is_offered()
             && (self.has_rendering()
+                || !self.kept.is_empty()
                 || self.pipeline.render_visible()
                 || self.puts_renderer_back_and_sees())
         {
@@ -267,6 +303,7 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         if seeded!(LeavesWithCarry) {
             self.works.clear();
             self.interactions.clear();
+            self.kept.clear();
         }
         self.shed();
         if !seeded!(LeavesWithRenderer) {

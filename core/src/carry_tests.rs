@@ -180,3 +180,46 @@ fn who_gives_the_shared_renderer_up_calls_for_what_it_sees() {
         });
     }
 }
+
+/// Two units of a frame with a shared renderer: one worker has it, to render the unit that it updated, and another one
+/// has updated the other unit.
+fn keeping(then: impl FnOnce(&Pipeline<'_, Void<'_>, &Calls>, &mut dyn FnMut(usize) -> Step)) {
+    let calls = Calls::default();
+    let void = Void { calls: &calls, before_entry: AtomicU32::new(0) };
+    with_pipeline(&calls, 1, |mut pipeline| {
+        assert!(pipeline.share(()).is_ok());
+        assert_eq!(pipeline.run(1), Ok(()));
+        let mut workers = [pipeline.worker(), pipeline.worker()];
+        let mut step =
+            |worker: usize| workers[worker].step(&void).unwrap_or_else(|error| panic!("{error}"));
+        for _ in 0..2 {
+            assert_eq!(step(0), Step::Worked(Stage::BroadPhase));
+        }
+        for worker in [0, 1] {
+            assert_eq!(step(worker), Step::Worked(Stage::Update));
+        }
+        assert!(!pipeline.render_visible(), "each is to be rendered by who updated it");
+        then(&pipeline, &mut step);
+    });
+}
+
+#[test]
+fn who_finds_the_renderer_taken_renders_its_own_unit_later() {
+    keeping(|pipeline, step| {
+        assert_eq!(step(0), Step::Worked(Stage::Render));
+        assert_eq!(step(0), Step::Idle, "the other unit is not for it");
+        assert_eq!(step(1), Step::Worked(Stage::Render));
+        assert!(pipeline.finished());
+    });
+}
+
+#[test]
+fn who_finds_nothing_else_to_do_leaves_its_rendering_to_who_has_the_renderer() {
+    keeping(|pipeline, step| {
+        assert_eq!(step(1), Step::Idle);
+        assert!(pipeline.render_visible());
+        assert_eq!(step(0), Step::Worked(Stage::Render));
+        assert_eq!(step(0), Step::Worked(Stage::Render));
+        assert!(pipeline.finished());
+    });
+}

@@ -94,6 +94,8 @@ faults! {
     LeavesWithRenderer;
     /// A worker sleeps with the shared renderer.
     SleepsWithRenderer;
+    /// A worker sleeps with a rendering that it keeps until the shared renderer is free.
+    SleepsWithRendering;
     /// Lost wake-up: who puts the shared renderer back does not look whether a rendering was queued meanwhile.
     NotLookedAgain;
     /// Lost wake-up: who took the shared renderer, and finds that others have rendered all, goes on to other work with

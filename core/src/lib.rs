@@ -8,7 +8,7 @@
 //! allocate, built with overflow checks off, as releases are). One [`worker::Worker::step`] does at
 //! most one work unit: its own cost is a bounded number of atomic operations (`PROTOCOL.md` §8), except
 //! that a compare-and-swap is retried when another worker succeeded at the same word meanwhile. A worker
-//! that is suspended anywhere holds back only the work unit in its hand, what it carries (64 others at
+//! that is suspended anywhere holds back only the work unit in its hand, what it carries (72 others at
 //! most, and the shared renderer while it has it) and calls for what it has queued in this step; in a swap it
 //! carries nothing and owes no call. One that is suspended while it waits may also hold back the call that it was
 //! woken by, and so the work unit that this was for, until another looks: workers that wait on one bell had better have

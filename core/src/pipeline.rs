@@ -147,9 +147,9 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         self.office.issue(renderer).map_err(|renderer| (renderer, full))
     }
 
-    /// Leaves `renderer` to all workers instead of giving tokens to some: whoever has updated a unit renders it too,
-    /// unless another worker is rendering, and so need not bring it from that core's cache to another's. It stays
-    /// until it is [taken back](Self::take_back), and all tokens with it.
+    /// Leaves `renderer` to all workers instead of giving tokens to some: whoever has updated a unit renders it too, at
+    /// once or between its next work units if another worker is rendering, and so it need not go from that core's cache
+    /// to another's. Who has nothing else to do renders others' units. It stays until it is [taken back](Self::take_back), and all tokens with it.
     ///
     /// # Errors
     /// The renderer back, and the number of tokens there are, if any is out or there is none.

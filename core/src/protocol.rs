@@ -240,7 +240,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         let on_display = self.window.display() == frame || seeded!(RenderedBeforeSwap);
         if on_display && (holder || out.takes_renderer()) {
             out.emit(Work::Render(unit));
-        } else {
+        } else if !(on_display && out.keeps(unit)) {
             out.queue(Work::Render(unit));
         }
         if self.config.entry == Entry::AfterUpdate {

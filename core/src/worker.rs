@@ -86,8 +86,12 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
     pub fn step(&mut self, env: &E) -> Result<Step, E::Error> {
         let Some(work) = self.next_work() else {
             self.carry.set_hungry(true);
-            // A rendering may have been put back.
-            self.carry.announce();
+            // A rendering may have been put back; and nobody else sees those that are kept.
+            if seeded!(SleepsWithRendering) {
+                self.carry.announce();
+            } else {
+                self.carry.let_go();
+            }
             return Ok(Step::Idle);
         };
         self.carry.set_hungry(false);
@@ -143,6 +147,12 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
     fn next_work(&mut self) -> Option<Work> {
         let pipeline = self.carry.pipeline;
         self.carry.share_renderer();
+        // What this worker updated first: it is in this core's cache.
+        if !self.carry.has_rendering()
+            && let Some(work) = self.carry.take_kept()
+        {
+            return Some(work);
+        }
         let holder = self.token.is_some() || self.carry.renders_shared;
         // Rendering first: only holders can, and a chain of carry-overs must not starve it.
         if holder
@@ -163,7 +173,11 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         }
         // Visible work may be gone when it is popped: look again, but no stage more than once,
         // so that a step is bounded.
-        for home in pipeline.tables.queues.homes.from(self.carry.home) {
+        for (place, home) in pipeline.tables.queues.homes.from(self.carry.home).enumerate() {
+            // Who has nothing left at home may find what takes long: no rendering is to wait for that.
+            if place > 0 {
+                self.carry.queue_kept();
+            }
             for _ in Stage::ALL {
                 let Some(stage) = migrate(self.stage, pipeline.visible(home, holder)) else {
                     break;

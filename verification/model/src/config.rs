@@ -59,6 +59,8 @@ pub enum Bug {
     LeaverSwallowsCall,
     /// A token that is given away stays.
     TokenDoubled,
+    /// A worker sleeps with renderings that it keeps until the shared renderer is free.
+    SleepsWithRendering,
     /// Whoever puts the shared renderer back does not look for renderings once more.
     NotLookedAgain,
     /// Whoever took the shared renderer, and finds that all is rendered, goes on to other work with it.

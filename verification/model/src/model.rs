@@ -56,7 +56,11 @@ impl Protocol {
             | At::Advancing(_)
             | At::Rendered(_)
             | At::Reentering(_) => carries.iter().for_each(|&carry| may(Act::Go { carry })),
-            At::Ringing | At::RingingToSwap | At::Calling | At::Leaving { .. } => {
+            At::Ringing
+            | At::RingingToSwap
+            | At::RingingToSleep
+            | At::Calling
+            | At::Leaving { .. } => {
                 self.rings(state, worker, &mut may);
             }
             At::Asleep => {}

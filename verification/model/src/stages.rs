@@ -113,9 +113,11 @@ impl Step<'_> {
         }
     }
 
-    /// `unit` is to be rendered, by this worker if it is its `own` rendering, and may enter its next frame.
+    /// `unit` is to be rendered, by this worker if it is its `own` rendering or once it has the shared renderer, and may
+    /// enter its next frame.
     fn pass_on(&mut self, unit: u8, own: bool) {
-        if own {
+        let is_kept = self.config.shared && self.state.is_displayed(unit);
+        if own || is_kept {
             self.emit(Work::Render(unit));
         } else {
             self.queue(Work::Render(unit));

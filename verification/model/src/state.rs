@@ -81,11 +81,11 @@ pub enum At {
     Interacted(u8),
     /// In the callback of an update.
     Updating(u8),
-    /// Has updated the unit, and queues its rendering unless it is its own: it has the shared renderer.
+    /// Has updated the unit, and carries its rendering, keeps it until the shared renderer is free, or queues it.
     Passing {
         /// The unit.
         unit: u8,
-        /// Whether the worker itself may render it.
+        /// Whether the worker itself may render it now.
         own: bool,
     },
     /// Lets the unit enter its next frame.
@@ -100,6 +100,8 @@ pub enum At {
     Counting,
     /// Announces what it has queued, and will swap.
     RingingToSwap,
+    /// Announces the renderings that it kept and has queued, and will sleep.
+    RingingToSleep,
     /// In the callback of a swap.
     Swapping,
     /// Lets units enter the next frame, from this one on, after a swap.
@@ -285,9 +287,10 @@ impl State {
         })
     }
 
-    /// What `worker` carries, and finds in the queues.
+    /// What `worker` carries, and finds in the queues, that it can do if it `renders` or not.
     pub(crate) fn work(&self, worker: &Worker, renders: bool) -> impl Iterator<Item = Work> {
-        worker.carried.iter().chain(self.visible(renders))
+        let carried = worker.carried.iter().filter(move |work| renders || !work.is_rendering());
+        carried.chain(self.visible(renders))
     }
 
     /// Whether a rendering is queued that may be rendered now.

@@ -48,6 +48,9 @@ impl Step<'_> {
     }
 
     pub(crate) fn go_waiting(&mut self) {
+        if self.at() == At::GoingOn && !self.worker().carried.is_empty() {
+            return self.queue_kept();
+        }
         let holds = self.worker().holds;
         let next = match self.at() {
             At::GoingOn if !self.config.sleep => At::Awake,
@@ -64,6 +67,16 @@ impl Step<'_> {
             at => unreachable!("nothing comes next at {at:?}"),
         };
         self.goes_to(next);
+    }
+
+    /// Nobody else sees the renderings that it keeps, which are all that it carries.
+    fn queue_kept(&mut self) {
+        if self.config.has(Bug::SleepsWithRendering) {
+            self.goes_to(At::Idle);
+        } else {
+            self.shed();
+            self.announce(At::RingingToSleep, At::Idle);
+        }
     }
 
     /// Has looked for work, for renderings too if it `renders`.
@@ -102,6 +115,7 @@ impl Step<'_> {
         match leaving {
             At::Calling => worker.at = At::GoingOn,
             At::RingingToSwap => worker.at = At::Swapping,
+            At::RingingToSleep => worker.at = At::Idle,
             At::Leaving { gone: true } => worker.at = At::Gone,
             At::Leaving { gone: false } => {
                 (worker.holds, worker.offers) = (doubled, true);

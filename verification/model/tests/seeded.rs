@@ -105,6 +105,7 @@ seeded! {
     leaver_swallows_call: LeaverSwallowsCall in Config { departures: 2, ..sleeping(3) }
         => property::PROGRESS;
     token_doubled: TokenDoubled in Config { handovers: 1, ..awake() } => property::TOKEN;
+    sleeps_with_rendering: SleepsWithRendering in sharing(2) => property::PROGRESS;
     not_looked_again: NotLookedAgain in sharing(2) => property::WAKES;
     goes_on_with_renderer: GoesOnWithRenderer in sharing(2) => property::WAKES;
     leaves_with_renderer: LeavesWithRenderer in Config { departures: 1, ..sharing(2) }

@@ -30,6 +30,7 @@ fn killer(fault: Fault) -> &'static str {
         LeavesWithCarry => "pipeline::spatial_after_update",
         LeavesWithRenderer => "shared::leaver_calls",
         SleepsWithRenderer => "shared::sleepers_end",
+        SleepsWithRendering => "shared::sleepers_end",
         NotLookedAgain => "shared::busy_after_it",
         GoesOnWithRenderer => "shared::all_rendered_meanwhile",
         RenderingCallsHolders => "shared::leaver_calls",

@@ -63,8 +63,9 @@ pub(crate) fn note(add: impl FnOnce(&mut Did)) {
     });
 }
 
-/// Work units that a worker carries at most, under loom: an interaction, and one that is none.
-const CARRIED: u32 = 2;
+/// Work units that a worker carries at most, under loom: an interaction, a rendering that it keeps, and one that is
+/// neither.
+const CARRIED: u32 = 3;
 /// Letters under way at most, in any model.
 const LETTERS: u32 = 2;
 

@@ -80,10 +80,13 @@ fn all_rendered_meanwhile() {
         let setup = Setup { units: 4, patience: Patience::Update, ..SHARED };
         let (pipeline, world) = build(setup);
         let [mut one, mut other] = [0, 1].map(|home| pipeline.worker_at(home));
-        // All enter the frame; the other one, with unit 2 to render, has the renderer when unit 0 is updated.
+        // All enter the frame; the other one, with unit 2 to render, has the renderer when unit 0 is updated, by a worker
+        // that leaves and so cannot keep the rendering.
         (0..setup.units).for_each(|_| _ = step(&mut one, world));
         assert_eq!(step(&mut other, world), Step::Worked(Stage::Update));
-        assert_eq!(step(&mut one, world), Step::Worked(Stage::Update));
+        let mut leaver = pipeline.worker_at(0);
+        assert_eq!(step(&mut leaver, world), Step::Worked(Stage::Update));
+        drop(leaver);
         let role = |worker| -> Role<u32> { Box::new(move || stay(pipeline, world, worker)) };
         let rendered = together(order, vec![role(one), role(other)]);
         verify(pipeline, world);
