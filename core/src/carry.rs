@@ -123,21 +123,25 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         self.pipeline.shared.is_offered() && self.kept.push(unit).is_ok()
     }
 
-    /// A rendering that was kept, if this worker has the shared renderer now.
+    /// A rendering that was kept, if this worker has the shared renderer now: of the unit that its core has seen last.
     #[inline]
     pub(crate) fn take_kept(&mut self) -> Option<Work> {
         if self.renders_shared { self.kept.pop().map(Work::Render) } else { None }
     }
 
-    /// Gives what is carried to whoever comes first.
+    /// Gives all that is carried to whoever comes first.
     fn shed(&mut self) {
+        self.shed_works();
+        self.queue_kept();
+    }
+
+    fn shed_works(&mut self) {
         while let Some(id) = self.interactions.pop_front() {
             self.queue(Work::Interact(id));
         }
         while let Some(work) = self.works.pop() {
             self.queue(work);
         }
-        self.queue_kept();
     }
 
     /// Gives the renderings that are kept to whoever comes first.
@@ -152,7 +156,11 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
     #[inline]
     pub(crate) fn share(&mut self) {
         if !self.is_empty() && self.pipeline.bells.somebody_is_hungry() {
-            self.shed();
+            self.shed_works();
+            // Nobody else can render meanwhile.
+            if !self.renders_shared {
+                self.queue_kept();
+            }
         }
         self.announce();
     }

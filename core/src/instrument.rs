@@ -96,6 +96,8 @@ faults! {
     SleepsWithRenderer;
     /// A worker sleeps with a rendering that it keeps until the shared renderer is free.
     SleepsWithRendering;
+    /// A worker goes to another home with a rendering that it keeps.
+    TakesRenderingElsewhere;
     /// Lost wake-up: who puts the shared renderer back does not look whether a rendering was queued meanwhile.
     NotLookedAgain;
     /// Lost wake-up: who took the shared renderer, and finds that others have rendered all, goes on to other work with

@@ -149,7 +149,9 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
 
     /// Leaves `renderer` to all workers instead of giving tokens to some: whoever has updated a unit renders it too, at
     /// once or between its next work units if another worker is rendering, and so it need not go from that core's cache
-    /// to another's. Who has nothing else to do renders others' units. It stays until it is [taken back](Self::take_back), and all tokens with it.
+    /// to another's; what it leaves to others, whoever has the renderer renders. A frame's swap may so wait for an update
+    /// of the next frame: where those take long a token's holder had better render. It stays until it is
+    /// [taken back](Self::take_back), and all tokens with it.
     ///
     /// # Errors
     /// The renderer back, and the number of tokens there are, if any is out or there is none.

@@ -175,7 +175,7 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         // so that a step is bounded.
         for (place, home) in pipeline.tables.queues.homes.from(self.carry.home).enumerate() {
             // Who has nothing left at home may find what takes long: no rendering is to wait for that.
-            if place > 0 {
+            if place > 0 && !seeded!(TakesRenderingElsewhere) {
                 self.carry.queue_kept();
             }
             for _ in Stage::ALL {

@@ -93,6 +93,10 @@ impl Protocol {
         let all = state.work(me, me.holds).chain(seen);
         let work: BTreeSet<Work> = all.filter(|work| !renders || work.is_rendering()).collect();
         work.iter().for_each(|&work| may(Act::Take(work)));
+        // What it keeps it queues where somebody is hungry, or before it goes to another home.
+        if me.at == At::GoingOn && !me.holds && me.carried.iter().any(Work::is_rendering) {
+            may(Act::Share);
+        }
         let awaits = config.sleep || me.at == At::GoingOn;
         if awaits && work.is_empty() && !me.offers {
             may(Act::Go { carry: false });
@@ -174,8 +178,9 @@ pub mod property {
     pub const TOKEN: &str = "6 token: as many as there are, and none renders without";
     /// Invariant 7.
     pub const PROGRESS: &str = "7 progress: nobody is stuck while frames are left";
-    /// Of the shared renderer: a rendering waits for nobody who does anything else while another sleeps.
-    pub const WAKES: &str = "7 progress: no rendering waits for other work while somebody sleeps";
+    /// Of the shared renderer: a queued rendering waits for nobody who does anything else while another sleeps.
+    pub const WAKES: &str =
+        "7 progress: no queued rendering waits for other work while somebody sleeps";
     /// A swap holds nothing back that others could do.
     pub const SWAPS: &str =
         "7 progress: who swaps carries nothing and has called for what it queued";

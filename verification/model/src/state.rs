@@ -342,8 +342,8 @@ impl State {
         self.workers.iter().all(|worker| reads(worker) & written == 0)
     }
 
-    /// No rendering waits for a callback, which may take long, while somebody sleeps, unless for one that renders or
-    /// swaps.
+    /// No queued rendering waits for a callback, which may take long, while somebody sleeps, unless for one that renders
+    /// or swaps.
     pub fn wakes_for_rendering(&self, config: &Config) -> bool {
         let sleeps = |worker: &Worker| worker.at == At::Asleep;
         let comes =

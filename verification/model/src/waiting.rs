@@ -16,8 +16,13 @@ impl Step<'_> {
     }
 
     pub(crate) fn share(&mut self) {
+        let at = self.at();
         self.shed();
-        self.end();
+        if at == At::GoingOn {
+            self.announce(At::Calling, At::GoingOn);
+        } else {
+            self.end();
+        }
     }
 
     /// Leaves, for good or without the token.

@@ -31,6 +31,7 @@ fn killer(fault: Fault) -> &'static str {
         LeavesWithRenderer => "shared::leaver_calls",
         SleepsWithRenderer => "shared::sleepers_end",
         SleepsWithRendering => "shared::sleepers_end",
+        TakesRenderingElsewhere => "shared::all_rendered_meanwhile",
         NotLookedAgain => "shared::busy_after_it",
         GoesOnWithRenderer => "shared::all_rendered_meanwhile",
         RenderingCallsHolders => "shared::leaver_calls",
