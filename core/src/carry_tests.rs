@@ -90,13 +90,23 @@ fn with_pipeline<'c, R>(
     tokens: u32,
     use_it: impl FnOnce(Pipeline<'_, Void<'c>, &'c Calls>) -> R,
 ) -> R {
+    with_units(&mut [(); 2].map(UnitSlot::new), calls, tokens, use_it)
+}
+
+/// The same of these units, three at most.
+fn with_units<'c, R>(
+    units: &mut [UnitSlot<()>],
+    calls: &'c Calls,
+    tokens: u32,
+    use_it: impl FnOnce(Pipeline<'_, Void<'c>, &'c Calls>) -> R,
+) -> R {
     let memory = Memory {
-        units: &mut [(); 2].map(UnitSlot::new),
+        units,
         interactions: &mut [const { InteractionSlot::spare(()) }; 2],
         contacts: &mut [const { ContactSlot::new() }; 2],
         segments: &mut [const { SegmentSlot::new() }; 2],
         letters: &mut [const { LetterSlot::new() }],
-        queues: &mut [const { QueueSlot::new() }; queue_slots(2, 2, 1, 1)],
+        queues: &mut [const { QueueSlot::new() }; queue_slots(3, 2, 1, 1)],
     };
     let config = Config { tokens, ..Config::default() };
     use_it(Pipeline::new(memory, config, calls).unwrap_or_else(|error| panic!("{error}")))
@@ -220,6 +230,32 @@ fn who_finds_nothing_else_to_do_leaves_its_rendering_to_who_has_the_renderer() {
         assert!(pipeline.render_visible());
         assert_eq!(step(0), Step::Worked(Stage::Render));
         assert_eq!(step(0), Step::Worked(Stage::Render));
+        assert!(pipeline.finished());
+    });
+}
+
+/// Others are hungry, but cannot render what is kept while its worker does.
+#[test]
+fn who_has_the_renderer_queues_none_of_what_it_keeps() {
+    let calls = Calls::default();
+    let void = Void { calls: &calls, before_entry: AtomicU32::new(0) };
+    with_units(&mut [(); 3].map(UnitSlot::new), &calls, 1, |mut pipeline| {
+        assert!(pipeline.share(()).is_ok());
+        assert_eq!(pipeline.run(1), Ok(()));
+        let (mut one, mut other) = (pipeline.worker(), pipeline.worker());
+        for _ in 0..3 {
+            assert_eq!(one.step(&void), Ok(Step::Worked(Stage::BroadPhase)));
+        }
+        assert_eq!(one.step(&void), Ok(Step::Worked(Stage::Update)));
+        for _ in 0..2 {
+            assert_eq!(other.step(&void), Ok(Step::Worked(Stage::Update)));
+        }
+        assert_eq!(one.step(&void), Ok(Step::Worked(Stage::Render)));
+        assert_eq!(one.step(&void), Ok(Step::Idle));
+        for _ in 0..2 {
+            assert_eq!(other.step(&void), Ok(Step::Worked(Stage::Render)));
+            assert!(!pipeline.render_visible());
+        }
         assert!(pipeline.finished());
     });
 }
