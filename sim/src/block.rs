@@ -10,7 +10,8 @@ use crate::simd::{Isa, Kernel, LaneSet, Simd, first_lanes, lanes};
 
 /// One or more objects that go through the stages together: those that are advanced side by side one after the other.
 ///
-/// What every other block asks first, in every frame, is in its first cache line.
+/// What every other block asks first, in every frame, is in its first cache line; what is asked of its objects where
+/// blocks are formed anew is in few.
 #[derive(Default)]
 #[repr(C, align(64))]
 pub struct Block {
@@ -21,6 +22,10 @@ pub struct Block {
     ids: Vec<ObjectId>,
     pub(crate) objects: Vec<Object>,
     extents: Extents,
+    /// What the objects' updates take, in seconds.
+    costs: Vec<f32>,
+    /// Some came since the objects were brought into their order.
+    disordered: bool,
 }
 
 impl Block {
@@ -28,7 +33,14 @@ impl Block {
     #[must_use]
     pub fn new(mut objects: Vec<Object>) -> Self {
         objects.sort_by_cached_key(Order::of);
-        let mut block = Self { objects, ..Self::default() };
+        let room = objects.capacity();
+        let mut block = Self {
+            objects,
+            ids: Vec::with_capacity(room),
+            extents: Extents::with_capacity(room),
+            costs: Vec::with_capacity(room),
+            ..Self::default()
+        };
         block.refresh();
         block
     }
@@ -37,6 +49,11 @@ impl Block {
     #[must_use]
     pub fn objects(&self) -> &[Object] {
         &self.objects
+    }
+
+    /// Their numbers.
+    pub(crate) fn ids(&self) -> &[ObjectId] {
+        &self.ids
     }
 
     /// The box around all its objects that may interact.
@@ -57,18 +74,67 @@ impl Block {
         self.groups
     }
 
-    /// Makes room for so many objects in an empty block.
-    pub(crate) fn reserve(&mut self, objects: usize) {
-        self.objects.reserve(objects);
-        self.ids.clear();
-        self.ids.reserve(objects);
-        self.extents.reserve(objects);
+    /// Where each of its objects is, and what its update takes, in seconds.
+    pub(crate) fn places(&self) -> impl Iterator<Item = (ObjectId, Vec3, f32)> {
+        let known = self.ids.iter().zip(&self.costs).enumerate();
+        known.map(|(place, (&id, &cost))| (id, self.extents.center(place), cost))
+    }
+
+    /// Moves the objects that are to leave to the end of `gone`.
+    pub(crate) fn part_with(&mut self, leaves: impl Fn(ObjectId) -> bool, gone: &mut Vec<Object>) {
+        for place in (0..self.ids.len()).rev() {
+            if leaves(self.ids[place]) {
+                gone.push(self.objects.swap_remove(place));
+                self.ids.swap_remove(place);
+                self.costs.swap_remove(place);
+                self.extents.swap_remove(place);
+                self.disordered = true;
+            }
+        }
+    }
+
+    /// Takes in one object more.
+    pub(crate) fn take_in(&mut self, object: Object) {
+        self.ids.push(object.id());
+        self.costs.push(object.cost());
+        self.extents.push(&object.interaction_extent());
+        self.groups |= group_set(object.group());
+        self.objects.push(object);
+        self.disordered = true;
+    }
+
+    /// Brings its own extent up to date after objects have come and gone.
+    pub(crate) fn fit(&mut self) {
+        if self.disordered {
+            let all = (0..self.ids.len()).map(|place| self.extents.at(place).bounds);
+            self.enclose(all.fold(Bounds::EMPTY, |all, one| all.union(&one)));
+        }
+    }
+
+    /// Brings its objects into their order, if some have come or gone, and says then where each was before.
+    pub(crate) fn put_in_order(&mut self, order: &mut Vec<(Order, usize)>) {
+        order.clear();
+        if !std::mem::take(&mut self.disordered) {
+            return;
+        }
+        order.extend(self.objects.iter().map(Order::of).zip(0..));
+        order.sort_unstable();
+        for place in 0..order.len() {
+            // What was there has been exchanged for others, as often as it was in the way.
+            let mut from = order[place].1;
+            while from < place {
+                from = order[from].1;
+            }
+            self.objects.swap(place, from);
+        }
     }
 
     /// Brings numbers, extents and groups up to date with the objects.
     pub(crate) fn refresh(&mut self) {
         self.ids.clear();
         self.ids.extend(self.objects.iter().map(Object::id));
+        self.costs.clear();
+        self.costs.extend(self.objects.iter().map(Object::cost));
         self.extents.resize(self.objects.len());
         self.groups = 0;
         let mut bounds = Bounds::EMPTY;
@@ -144,7 +210,7 @@ struct ExtentLanes {
 }
 
 impl ExtentLanes {
-    /// NaNs, which no box overlaps: one without end would overlap the empty one.
+    /// As [`Extent::NONE`], in all lanes.
     const NONE: Self = {
         let none = [f32::NAN; LANES];
         Self { min: [none; 3], max: [none; 3], center: [none; 3], radius: none }
@@ -183,9 +249,26 @@ impl Extents {
         }
     }
 
-    /// Makes room for so many extents in all.
-    fn reserve(&mut self, len: usize) {
-        self.chunks.reserve(len.div_ceil(LANES).saturating_sub(self.chunks.len()));
+    /// None, with room for so many.
+    fn with_capacity(len: usize) -> Self {
+        Self { chunks: Vec::with_capacity(len.div_ceil(LANES)), len: 0 }
+    }
+
+    fn push(&mut self, extent: &Extent) {
+        if self.len == self.chunks.len() * LANES {
+            self.chunks.push(ExtentLanes::NONE);
+        }
+        self.len += 1;
+        self.set(self.len - 1, extent);
+    }
+
+    /// Puts the last one to `place`, whose own is gone then.
+    fn swap_remove(&mut self, place: usize) {
+        let last = self.len - 1;
+        self.set(place, &self.at(last));
+        self.set(last, &Extent::NONE);
+        self.len = last;
+        self.chunks.truncate(last.div_ceil(LANES));
     }
 
     fn set(&mut self, place: usize, extent: &Extent) {
@@ -196,6 +279,12 @@ impl Extents {
             chunk.center[axis][lane] = extent.center[axis];
         }
         chunk.radius[lane] = extent.radius;
+    }
+
+    /// The middle of what is at `place`.
+    fn center(&self, place: usize) -> Vec3 {
+        let (chunk, lane) = (&self.chunks[place / LANES], place % LANES);
+        Vec3::from_array([0, 1, 2].map(|axis| chunk.center[axis][lane]))
     }
 
     /// The extent at `place`.

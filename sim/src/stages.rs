@@ -145,11 +145,13 @@ impl Stages {
         post: &mut dyn FnMut(ObjectId, ObjectId, Message),
     ) {
         let began = is_timed(frame).then(Instant::now);
-        let Workspace { received: memory, springs } = workspace;
+        let Workspace { received: memory, springs, order } = workspace;
         let mut received = mem::take(memory);
         received.extend(block, results);
+        // Interactions found the objects where they were before.
+        block.put_in_order(order);
         for (place, object) in block.objects.iter_mut().enumerate() {
-            let received = received.at(place);
+            let received = received.at(order.get(place).map_or(place, |&(_, before)| before));
             if object.quarantined().is_some() {
                 continue;
             }
@@ -166,12 +168,12 @@ impl Stages {
             block.objects[waiting.place].refresh(frame, self.simd);
         }
         *memory = received.emptied();
-        block.refresh();
         if let Some(took) = began.map(|began| began.elapsed()) {
             // Bodies that are advanced together have no time of their own.
             let share = took / block.objects.len().max(1) as u32;
             block.objects.iter_mut().for_each(|object| object.note_cost(share));
         }
+        block.refresh();
     }
 
     fn update_object<'m>(

@@ -66,24 +66,19 @@ fn every_object_is_in_one_block_before_and_after_regrouping() {
         let mut all: Vec<u32> = blocks.iter().flat_map(numbers).collect();
         all.sort_unstable();
         assert_eq!(all, (0..106).collect::<Vec<_>>());
-        blocks.iter_mut().for_each(|block| blocking.drain(block));
-        assert!(blocks.iter().all(|block| block.objects().is_empty()));
-        blocking.split();
-        blocks.iter_mut().enumerate().for_each(|(index, block)| blocking.fill(index, block));
+        blocking.split(&mut blocks);
     }
 }
 
 #[test]
-fn blocks_that_were_not_drained_keep_their_objects() {
+fn fewer_blocks_than_there_are_stay_as_they_are() {
     let objects = particles(300, false, true).objects;
     let (mut blocking, mut blocks) =
         Blocking::new(objects, Grain::Spatial, 2).expect("particles are well formed");
-    let kept = numbers(&blocks[0]);
-    for drained in [0, 1] {
-        blocks.iter_mut().skip(1).take(drained).for_each(|block| blocking.drain(block));
-        blocking.split();
-        assert_eq!(numbers(&blocks[0]), kept);
-    }
+    let before: Vec<_> = blocks.iter().map(numbers).collect();
+    blocking.split(&mut blocks[..3]);
+    blocking.deal(&mut [], 2, 0.0);
+    assert_eq!(blocks.iter().map(numbers).collect::<Vec<_>>(), before);
 }
 
 #[test]
@@ -146,9 +141,7 @@ fn every_home_has_its_share_of_solitary_objects() {
     let solitary = particles(300, false, true).objects.into_iter().map(Object::solitary).collect();
     let (mut blocking, mut blocks) =
         Blocking::new(solitary, Grain::Spatial, 4).expect("particles are well formed");
-    blocks.iter_mut().for_each(|block| blocking.drain(block));
-    blocking.deal(2, 0.0);
-    blocks.iter_mut().enumerate().for_each(|(index, block)| blocking.fill(index, block));
+    blocking.deal(&mut blocks, 2, 0.0);
     let mut of_home = [0, 0];
     for (index, block) in blocks.iter().enumerate() {
         of_home[blocking.home(index) as usize] += block.objects().len();

@@ -49,11 +49,11 @@ impl Waiting {
 
 /// The order in which a block has its objects: those that are advanced together one after the other, and each with
 /// what makes as many substeps, as far as they stay as they are.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Order {
     /// Where a body's topology is in memory, whether it is damped, and its substeps.
     springs: Option<(usize, bool, Reverse<u32>)>,
-    pub(crate) id: ObjectId,
+    id: ObjectId,
 }
 
 impl Order {

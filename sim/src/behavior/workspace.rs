@@ -17,6 +17,8 @@ pub struct Workspace {
     /// Empty between two updates.
     pub(crate) received: Received<'static>,
     pub(crate) springs: SpringWork,
+    /// Where the objects of a block that is brought into its order were before.
+    pub(crate) order: Vec<(batch::Order, usize)>,
 }
 
 /// What springs are advanced in.
@@ -65,8 +67,9 @@ impl Workspace {
     /// Memory that usually need not grow.
     pub(crate) fn with_room(room: Room) -> Self {
         let mut workspace = Self::default();
-        let Self { received, springs } = &mut workspace;
+        let Self { received, springs, order } = &mut workspace;
         received.reserve(room.objects, room.objects * TOUCHED_PER_OBJECT);
+        order.reserve(room.objects);
         springs.waiting.reserve(room.objects);
         springs.alone.reserve(room.nodes);
         springs.abreast.reserve(room.abreast);

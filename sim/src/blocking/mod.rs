@@ -5,9 +5,8 @@ mod split;
 use thiserror::Error;
 
 use self::split::{Key, Members};
-use crate::behavior::batch::Order;
 use crate::block::Block;
-use crate::object::Object;
+use crate::object::{Object, ObjectId};
 use crate::simd::HALF;
 
 /// How objects are grouped.
@@ -69,23 +68,24 @@ const UNEVENNESS: usize = 2;
 /// Groups objects into a number of blocks that stays the same; which objects are together changes.
 ///
 /// Scenery and solitary objects have blocks of their own, and of scenery what reaches far: the boxes of walls would make
-/// any block overlap every other. To regroup, every block is drained, the positions are split, and every block
-/// is filled again.
+/// any block overlap every other. To regroup, the positions are split anew; as most objects stay with those that they
+/// were with, only those that do not are moved.
 pub struct Blocking {
-    objects: Vec<Option<Object>>,
-    /// The numbers of those that move, as they were when they were taken over.
-    moving: Vec<u32>,
     members: Vec<Members>,
     keys: Vec<Key>,
-    /// Of the block that is being filled.
-    order: Vec<Order>,
+    /// The number of the block that each object is, or is to be, in, by the objects' numbers.
+    block_of: Vec<u32>,
+    /// Objects on their way from block to block.
+    leaving: Vec<Object>,
+    /// For each block of moving objects the part of space that it has, and is to have, by the parts' numbers.
+    parts: Vec<usize>,
+    /// For each part the block that is to have it.
+    ranks: Vec<usize>,
     moving_blocks: usize,
     /// The last of all.
     solitary_blocks: usize,
     /// Moving objects are shared out so many at a time: as many as are advanced side by side, or one by one.
     share: usize,
-    /// Room for objects in every block of moving ones: how many each has changes.
-    room: usize,
 }
 
 impl Blocking {
@@ -138,9 +138,8 @@ impl Blocking {
     ) -> (Self, Vec<Block>) {
         objects.sort_unstable_by_key(Object::id);
         objects.iter_mut().for_each(Object::refit);
-        let objects: Vec<Option<Object>> = objects.into_iter().map(Some).collect();
         let mut kinds: [Vec<u32>; 3] = Default::default();
-        for object in objects.iter().flatten() {
+        for object in &objects {
             kinds[kind(object)].push(object.id().0);
         }
         let [moving, scenery, solitary] = kinds;
@@ -154,58 +153,58 @@ impl Blocking {
             Grain::Spatial => group_scenery(&objects, scenery, workers),
         };
         let share = if moving_blocks == moving.len() { 1 } else { HALF };
+        // How many each block has changes.
         let room = UNEVENNESS * moving.len().div_ceil(share).div_ceil(moving_blocks.max(1)) * share;
-        let empty = || Members::of(Vec::with_capacity(room));
         let mut members = Vec::new();
-        members.resize_with(moving_blocks, empty);
+        members.resize_with(moving_blocks, || Members::of(Vec::with_capacity(room)));
+        let mut keys: Vec<Key> = moving.iter().map(|&id| Key::of(&objects[id as usize])).collect();
+        split::evenly(&mut keys, &mut members, 0, share);
+        number(&mut members);
         members.extend(scenery);
         let size = solitary.len().div_ceil(count(solitary.len()).max(1)).max(1);
         let solitary = solitary.chunks(size).map(|ids| Members::of(ids.to_vec()));
         let solitary_blocks = solitary.len();
         members.extend(solitary);
-        let mut blocks = Vec::new();
-        blocks.resize_with(members.len(), Block::default);
-        let keys = Vec::with_capacity(moving.len());
-        let order = Vec::with_capacity(room);
-        let mut blocking = Self {
-            objects,
-            moving,
+        let mut block_of = vec![0; objects.len()];
+        assign(&mut block_of, &members);
+        let room = |members: &Members| members.ids.capacity();
+        let mut grouped: Vec<Vec<Object>> =
+            members.iter().map(room).map(Vec::with_capacity).collect();
+        for object in objects {
+            grouped[block_of[object.id().0 as usize] as usize].push(object);
+        }
+        let blocking = Self {
             members,
             keys,
-            order,
+            block_of,
+            leaving: Vec::with_capacity(moving.len()),
+            parts: (0..moving_blocks).collect(),
+            ranks: vec![0; moving_blocks],
             moving_blocks,
             solitary_blocks,
             share,
-            room,
         };
-        blocking.split();
-        for (index, block) in blocks.iter_mut().enumerate() {
-            blocking.fill(index, block);
-        }
-        (blocking, blocks)
+        (blocking, grouped.into_iter().map(Block::new).collect())
     }
 
-    /// Takes all objects out of a block.
-    pub fn drain(&mut self, block: &mut Block) {
-        for object in block.objects.drain(..) {
-            if let Some(slot) = self.objects.get_mut(object.id().0 as usize) {
-                *slot = Some(object);
-            }
-        }
-    }
-
-    /// Decides, when all blocks are drained, which objects go where: as many to each.
-    pub fn split(&mut self) {
-        self.list();
-        split::evenly(&mut self.keys, &mut self.members[..self.moving_blocks], 0, self.share);
+    /// Forms anew the blocks that it gave, which hold the same objects: as many to each, and those that are close in
+    /// space come one after the other. Does nothing with fewer of them.
+    pub fn split(&mut self, blocks: &mut [Block]) {
+        let Some(blocks) = blocks.get_mut(..self.moving_blocks) else { return };
+        self.list(blocks);
+        let members = &mut self.members[..self.moving_blocks];
+        split::evenly(&mut self.keys, members, 0, self.share);
+        number(members);
+        self.regroup(blocks);
     }
 
     /// The same for so many homes, which get as much of the work as makes them take equally long, as far as that is
     /// known. Who works at home 0 does something else too, for `besides` seconds a frame. Blocks of one home are close
     /// in space, and each has its longest blocks first, so that none of its last is long. Of solitary objects each home
     /// has as many blocks.
-    pub fn deal(&mut self, homes: u32, besides: f32) {
-        self.list();
+    pub fn deal(&mut self, blocks: &mut [Block], homes: u32, besides: f32) {
+        let Some(blocks) = blocks.get_mut(..self.moving_blocks) else { return };
+        self.list(blocks);
         let homes = homes.max(1);
         let first_solitary = self.members.len() - self.solitary_blocks;
         for (place, members) in self.members[first_solitary..].iter_mut().enumerate() {
@@ -213,15 +212,17 @@ impl Blocking {
         }
         let members = &mut self.members[..self.moving_blocks];
         split::among_homes(&mut self.keys, members, 0..homes, self.share, besides);
-        members.iter_mut().enumerate().for_each(|(place, members)| members.place = place);
+        number(members);
         members.sort_unstable_by_key(Members::order);
+        self.regroup(blocks);
     }
 
-    /// Lists where the objects are.
-    fn list(&mut self) {
+    /// Lists where the objects of these blocks are.
+    fn list(&mut self, blocks: &[Block]) {
         self.keys.clear();
-        let object = |&id: &u32| self.objects.get(id as usize)?.as_ref();
-        self.keys.extend(self.moving.iter().filter_map(object).map(Key::new));
+        // A block may be another that was put in its place, with an object that is not known here.
+        let is_known = |key: &Key| (key.id as usize) < self.block_of.len();
+        self.keys.extend(blocks.iter().flat_map(Block::places).map(Key::new).filter(is_known));
     }
 
     /// The home of the block number `index`; 0 without such a block, and for those that never move.
@@ -230,20 +231,56 @@ impl Blocking {
         self.members.get(index).map_or(0, |members| members.home)
     }
 
-    /// Puts the objects of the block number `index` into it.
-    pub fn fill(&mut self, index: usize, block: &mut Block) {
-        let Self { objects, members, order, room, moving_blocks, .. } = self;
-        let Some(Members { ids, .. }) = members.get(index) else { return };
-        let room = if index < *moving_blocks { *room } else { 0 };
-        block.reserve(ids.len().max(room));
-        order.clear();
-        let there = |&id: &u32| objects.get(id as usize)?.as_ref().map(Order::of);
-        order.extend(ids.iter().filter_map(there));
-        order.sort_unstable();
-        for Order { id, .. } in order {
-            block.objects.extend(objects.get_mut(id.0 as usize).and_then(Option::take));
+    /// Brings the objects to the blocks that they are to be in.
+    fn regroup(&mut self, blocks: &mut [Block]) {
+        assign(&mut self.block_of, &self.members[..blocks.len()]);
+        self.carry_on(blocks);
+        let Self { block_of, leaving, .. } = self;
+        let block_of = |id: ObjectId| block_of.get(id.0 as usize).map(|&block| block as usize);
+        for (index, block) in blocks.iter_mut().enumerate() {
+            block.part_with(|id| block_of(id).is_some_and(|to| to != index), leaving);
         }
-        block.refresh();
+        for object in leaving.drain(..) {
+            if let Some(block) = block_of(object.id()) {
+                blocks[block].take_in(object);
+            }
+        }
+        blocks.iter_mut().for_each(Block::fit);
+    }
+
+    /// Gives each part of space the block that had it before, whatever its number is now: most objects stay then.
+    fn carry_on(&mut self, blocks: &mut [Block]) {
+        let Self { members, parts, ranks, .. } = self;
+        for (index, members) in members[..blocks.len()].iter().enumerate() {
+            ranks[members.part] = index;
+        }
+        for part in &mut *parts {
+            *part = ranks[*part];
+        }
+        for index in 0..blocks.len() {
+            while parts[index] != index {
+                let to = parts[index];
+                blocks.swap(index, to);
+                parts.swap(index, to);
+            }
+        }
+        for (part, members) in parts.iter_mut().zip(members) {
+            *part = members.part;
+        }
+    }
+}
+
+/// Numbers the parts of space that blocks were given.
+fn number(members: &mut [Members]) {
+    members.iter_mut().enumerate().for_each(|(part, members)| members.part = part);
+}
+
+/// Notes which block each object is to be in, by the objects' numbers.
+fn assign(block_of: &mut [u32], members: &[Members]) {
+    for (index, members) in members.iter().enumerate() {
+        for &id in &members.ids {
+            block_of[id as usize] = index as u32;
+        }
     }
 }
 
@@ -257,10 +294,10 @@ fn kind(object: &Object) -> usize {
 }
 
 /// Who of the scenery is together: what reaches far, as walls do, and, where it is much, what of the rest is close.
-fn group_scenery(objects: &[Option<Object>], ids: Vec<u32>, workers: usize) -> Vec<Members> {
-    let object = |id: u32| objects.get(id as usize)?.as_ref();
+fn group_scenery(objects: &[Object], ids: Vec<u32>, workers: usize) -> Vec<Members> {
+    let object = |id: u32| objects.get(id as usize);
     let keys = |ids: &[u32]| -> Vec<Key> {
-        ids.iter().filter_map(|&id| object(id)).map(Key::new).collect()
+        ids.iter().filter_map(|&id| object(id)).map(Key::of).collect()
     };
     let far = FAR * split::span(&keys(&ids));
     let reaches_far = |&id: &u32| {

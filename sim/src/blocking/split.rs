@@ -4,7 +4,9 @@
 use std::cmp::{Ordering, Reverse};
 use std::ops::Range;
 
-use crate::object::Object;
+use glam::Vec3;
+
+use crate::object::{Object, ObjectId};
 
 /// Who is in a block.
 pub(super) struct Members {
@@ -12,20 +14,20 @@ pub(super) struct Members {
     /// What their updates take, in seconds, as far as it is known.
     cost: f32,
     pub(super) home: u32,
-    /// The place among the blocks as they were split: close in space are close in number.
-    pub(super) place: usize,
+    /// The number of their part of space, as it was split: close in space are close in number.
+    pub(super) part: usize,
 }
 
 impl Members {
     /// These, at home 0, whose updates take nobody knows how long.
     pub(super) fn of(ids: Vec<u32>) -> Self {
-        Self { ids, cost: 0.0, home: 0, place: 0 }
+        Self { ids, cost: 0.0, home: 0, part: 0 }
     }
 
-    /// By home; there by the power of two of their cost, the dearest first; there by place, for neighbours
+    /// By home; there by the power of two of their cost, the dearest first; there by part, for neighbours
     /// that come one after the other meet in the cache.
     pub(super) fn order(&self) -> (u32, Reverse<i32>, usize) {
-        (self.home, Reverse(self.cost.log2() as i32), self.place)
+        (self.home, Reverse(self.cost.log2() as i32), self.part)
     }
 }
 
@@ -33,13 +35,18 @@ impl Members {
 #[derive(Clone, Copy)]
 pub(super) struct Key {
     center: [f32; 3],
-    id: u32,
+    pub(super) id: u32,
     cost: f32,
 }
 
 impl Key {
-    pub(super) fn new(object: &Object) -> Self {
-        Self { center: object.center().to_array(), id: object.id().0, cost: object.cost() }
+    pub(super) fn of(object: &Object) -> Self {
+        Self::new((object.id(), object.center(), object.cost()))
+    }
+
+    /// Of an object with this number, place and cost.
+    pub(super) fn new((id, center, cost): (ObjectId, Vec3, f32)) -> Self {
+        Self { center: center.to_array(), id: id.0, cost }
     }
 }
 
@@ -126,7 +133,7 @@ fn part_at(keys: &mut [Key], count: usize, axis: usize) -> (&mut [Key], &mut [Ke
     let along = |a: &Key, b: &Key| -> Ordering {
         a.center[axis].total_cmp(&b.center[axis]).then(a.id.cmp(&b.id))
     };
-    // Blocks that were not drained leave fewer objects than there is room for.
+    // There may be none at all.
     if count < keys.len() {
         keys.select_nth_unstable_by(count, along);
     }

@@ -1,3 +1,4 @@
+use std::fmt::Debug;
 use std::time::Duration;
 
 use glam::Vec3;
@@ -7,9 +8,11 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::behavior::Fixed;
+use crate::behavior::batch::Order;
 use crate::geometry::{Geometry, Rigid};
 use crate::object::{Group, ObjectId};
 use crate::scene::ParticleScene;
+use crate::simd::Simd;
 
 /// Deals particles whose updates take so many microseconds, for two workers; for each home what its blocks' updates
 /// take, and how many objects they have.
@@ -21,16 +24,100 @@ fn dealt(micros: &[u64], homes: u32, besides: u64) -> Vec<Vec<(u64, usize)>> {
     }
     let (mut blocking, mut blocks) =
         Blocking::new(objects, Grain::Spatial, 2).expect("a valid environment");
-    blocks.iter_mut().for_each(|block| blocking.drain(block));
-    blocking.deal(homes, Duration::from_micros(besides).as_secs_f32());
+    blocking.deal(&mut blocks, homes, Duration::from_micros(besides).as_secs_f32());
     let mut given = vec![Vec::new(); homes as usize];
-    for (index, block) in blocks.iter_mut().enumerate().take(blocking.moving_blocks) {
-        blocking.fill(index, block);
+    for (index, block) in blocks.iter().enumerate().take(blocking.moving_blocks) {
         let cost = |object: &Object| (object.cost() * 1e6).round() as u64;
         let objects = block.objects();
         given[blocking.home(index) as usize].push((objects.iter().map(cost).sum(), objects.len()));
     }
     given
+}
+
+/// What others ask of a block: where its objects are and what they cost, its box, and who may touch.
+fn asked(block: &Block) -> impl PartialEq + Debug + use<> {
+    let mut found = Vec::new();
+    block.overlaps_within(Simd::detect(), &mut found);
+    (block.places().collect::<Vec<_>>(), block.bounds(), found)
+}
+
+/// Particles of which many have moved since they were grouped, in blocks formed anew.
+fn regrouped() -> Vec<Block> {
+    let scene = ParticleScene::new(300).build().expect("a valid scene");
+    let (mut blocking, mut blocks) =
+        Blocking::new(scene.objects, Grain::Spatial, 2).expect("a valid environment");
+    for block in &mut blocks {
+        for object in &mut block.objects {
+            let id = object.id().0;
+            let shift = Vec3::new(id as f32 % 7.0, id as f32 % 5.0, id as f32 % 3.0) * 0.05;
+            let Some(mesh) = object.geometry.as_mesh_mut() else { continue };
+            for node in 0..mesh.positions.len() {
+                let position = mesh.positions.get(node).expect("a node");
+                mesh.positions.set(node, position + shift);
+            }
+            object.refit();
+            object.note_cost(Duration::from_micros(u64::from(id % 97 + 1)));
+        }
+        block.refresh();
+    }
+    blocking.deal(&mut blocks, 2, 0.0);
+    blocks
+}
+
+#[test]
+fn blocks_formed_anew_are_as_if_all_were_looked_at() {
+    for mut block in regrouped() {
+        let told = asked(&block);
+        block.refresh();
+        assert_eq!(asked(&block), told);
+    }
+}
+
+#[test]
+fn who_came_is_put_in_order_and_found_where_it_was() {
+    let (mut order, mut disordered) = (Vec::new(), 0);
+    for mut block in regrouped() {
+        let before: Vec<ObjectId> = block.ids().to_vec();
+        block.put_in_order(&mut order);
+        disordered += usize::from(!order.is_empty());
+        for (object, &(_, place)) in block.objects().iter().zip(&order) {
+            assert_eq!(object.id(), before[place]);
+        }
+        assert!(block.objects().iter().map(Order::of).is_sorted());
+        block.put_in_order(&mut order);
+        assert!(order.is_empty(), "it is in order");
+    }
+    assert!(disordered > 2, "{disordered}");
+}
+
+#[test]
+fn a_block_that_comes_elsewhere_keeps_its_objects() {
+    let scene = ParticleScene::new(1_000).build().expect("a valid scene");
+    let (mut blocking, mut blocks) =
+        Blocking::new(scene.objects, Grain::Spatial, 2).expect("a valid environment");
+    let numbers = |blocks: &[Block]| -> Vec<Vec<ObjectId>> {
+        blocks.iter().map(|block| block.ids().to_vec()).collect()
+    };
+    let before = numbers(&blocks);
+    let moving = blocking.moving_blocks;
+    for (index, block) in blocks.iter_mut().take(moving).enumerate() {
+        // The later ones take longer.
+        let took = Duration::from_micros(1 << index.min(20));
+        block.objects.iter_mut().for_each(|object| object.note_cost(took));
+        block.refresh();
+    }
+    for _ in 0..2 {
+        blocking.deal(&mut blocks, 1, 0.0);
+        let mut after = numbers(&blocks);
+        assert_ne!(after, before);
+        after[..moving].reverse();
+        assert_eq!(after, before);
+        let mut order = Vec::new();
+        for block in &mut blocks {
+            block.put_in_order(&mut order);
+            assert!(order.is_empty(), "somebody has moved");
+        }
+    }
 }
 
 fn cost(home: &[(u64, usize)]) -> u64 {

@@ -1,5 +1,6 @@
 //! Long-lived threads with equal shares fixed beforehand.
 
+use std::mem;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Sender, channel};
@@ -31,6 +32,8 @@ pub struct StaticExecutor {
     team: Team,
     shared: Arc<Shared>,
     blocking: Blocking,
+    /// Room for the blocks while they are formed anew.
+    spare: Vec<Block>,
     own: Own,
     grain: Grain,
     running: Running,
@@ -108,18 +111,18 @@ impl StaticExecutor {
         });
         let threads = waiting.into_iter().map(|thread| thread.begin(&shared)).collect();
         let team = Team { threads, shared: Arc::clone(&shared) };
-        let (blocking, running) = (world.blocking, Running::new());
-        Ok(Self { team, shared, blocking, own: Own::new(room), grain, running, frame })
+        let (blocking, spare) = (world.blocking, Vec::with_capacity(count));
+        let (own, running) = (Own::new(room), Running::new());
+        Ok(Self { team, shared, blocking, spare, own, grain, running, frame })
     }
 
     /// Forms the blocks anew.
     fn regroup(&mut self) {
-        for block in &self.shared.blocks {
-            self.blocking.drain(&mut write(block));
-        }
-        self.blocking.split();
-        for (index, block) in self.shared.blocks.iter().enumerate() {
-            self.blocking.fill(index, &mut write(block));
+        let blocks = || self.shared.blocks.iter().map(write);
+        self.spare.extend(blocks().map(|mut block| mem::take(&mut *block)));
+        self.blocking.split(&mut self.spare);
+        for (mut block, formed) in blocks().zip(self.spare.drain(..)) {
+            *block = formed;
         }
     }
 

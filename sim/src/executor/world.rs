@@ -69,16 +69,10 @@ impl World {
     /// Forms the blocks anew: those that are close come one after the other, or those that take longest come first,
     /// which is best where threads take them up one by one in their order.
     pub(super) fn regroup(&mut self, longest_first: bool) {
-        for block in &mut self.blocks {
-            self.blocking.drain(block);
-        }
         if longest_first {
-            self.blocking.deal(1, 0.0);
+            self.blocking.deal(&mut self.blocks, 1, 0.0);
         } else {
-            self.blocking.split();
-        }
-        for (index, block) in self.blocks.iter_mut().enumerate() {
-            self.blocking.fill(index, block);
+            self.blocking.split(&mut self.blocks);
         }
     }
 }

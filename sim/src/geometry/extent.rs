@@ -39,6 +39,14 @@ impl Extent {
     pub const EMPTY: Self =
         Self { bounds: Bounds::EMPTY, center: Vec3::ZERO, radius: f32::INFINITY, finite: true };
 
+    /// Of no object: NaNs, which no box overlaps; one without end would overlap the empty one.
+    pub(crate) const NONE: Self = Self {
+        bounds: Bounds { min: Vec3::NAN, max: Vec3::NAN },
+        center: Vec3::NAN,
+        radius: f32::NAN,
+        finite: false,
+    };
+
     /// Whether the objects in them may touch: the boxes share a point, and the spheres do so or miss each other by
     /// less than a thousandth.
     #[must_use]

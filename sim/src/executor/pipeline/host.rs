@@ -38,8 +38,8 @@ impl Register {
 
     /// Notes that the objects of `block` are in unit `unit`.
     pub(super) fn locate(&self, unit: usize, block: &Block) {
-        for object in block.objects() {
-            if let Some(place) = self.0.get(object.id().0 as usize) {
+        for id in block.ids() {
+            if let Some(place) = self.0.get(id.0 as usize) {
                 // Relaxed, as is the load: the pipeline's lock separates runs from changes.
                 place.store(unit as u32, Ordering::Relaxed);
             }

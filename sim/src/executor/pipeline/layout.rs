@@ -80,11 +80,7 @@ impl Formed {
         let (mut blocking, mut blocks) = Blocking::group(objects, grain, workers);
         let interactions = match grain {
             Grain::Spatial => {
-                blocks.iter_mut().for_each(|block| blocking.drain(block));
-                blocking.deal(homes, 0.0);
-                for (index, block) in blocks.iter_mut().enumerate() {
-                    blocking.fill(index, block);
-                }
+                blocking.deal(&mut blocks, homes, 0.0);
                 spare_interactions(&blocks)
             }
             Grain::Pairwise => modelled_interactions(stages, &blocks),

@@ -152,7 +152,7 @@ impl PipelineExecutor {
             timeline: self.timeline.as_deref(),
         };
         let regrouping = Regrouping {
-            blocking: (self.grain == Grain::Spatial).then_some(blocking),
+            blocking: (self.grain == Grain::Spatial).then_some((blocking, &mut *blocks)),
             mail: &mut self.mail,
             homes: *homes,
             limits,

@@ -1,5 +1,6 @@
 //! Frames run with the same tables: batches, and the threads that work on them.
 
+use std::mem;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard};
 use std::thread;
@@ -14,6 +15,7 @@ use super::clock::{StageClock, Times};
 use super::host::{Host, Parcel, Screen, Shared};
 use super::memory::Limits;
 use super::team::Team;
+use crate::block::Block;
 use crate::blocking::{Blocking, FRAMES_PER_BLOCKING, Grain};
 use crate::cost::Cost;
 use crate::executor::on_panic::OnPanic;
@@ -42,8 +44,8 @@ pub(super) enum End {
 
 /// What is done between two batches.
 pub(super) struct Regrouping<'x> {
-    /// What forms blocks anew, where there are any.
-    pub(super) blocking: Option<&'x mut Blocking>,
+    /// What forms blocks anew, where there are any, and room for them.
+    pub(super) blocking: Option<(&'x mut Blocking, &'x mut Vec<Block>)>,
     /// Objects' messages for the next frame.
     pub(super) mail: &'x mut Vec<(From, Parcel)>,
     pub(super) homes: u32,
@@ -83,7 +85,7 @@ impl Regrouping<'_> {
 
     /// Gives the blocks the homes that they were dealt to.
     fn settle(&self, pipeline: &mut SimPipeline<'_, '_>) {
-        if let Some(blocking) = self.blocking.as_deref() {
+        if let Some((blocking, _)) = &self.blocking {
             pipeline.set_homes(|unit| blocking.home(unit.index()));
         }
     }
@@ -100,15 +102,14 @@ impl Regrouping<'_> {
         pipeline: &mut SimPipeline<'_, '_>,
         rendering: Cost,
     ) -> Result<(), usize> {
-        let due =
-            self.blocking.as_deref_mut().filter(|_| world::regroups_before(Grain::Spatial, frame));
-        let Some(blocking) = due else { return Ok(()) };
-        pipeline.objects_mut().for_each(|unit| blocking.drain(&mut unit.block));
+        let due = self.blocking.as_mut().filter(|_| world::regroups_before(Grain::Spatial, frame));
+        let Some((blocking, blocks)) = due else { return Ok(()) };
+        blocks.extend(pipeline.objects_mut().map(|unit| mem::take(&mut unit.block)));
         // Home 0 is the calling thread's, which alone renders if anything is known of that.
-        blocking.deal(self.homes, rendering.seconds());
-        for (index, unit) in pipeline.objects_mut().enumerate() {
-            blocking.fill(index, &mut unit.block);
-            shared.register.locate(index, &unit.block);
+        blocking.deal(blocks, self.homes, rendering.seconds());
+        for (index, (unit, block)) in pipeline.objects_mut().zip(blocks.drain(..)).enumerate() {
+            shared.register.locate(index, &block);
+            unit.block = block;
         }
         self.settle(pipeline);
         self.take_mail(shared, pipeline);
