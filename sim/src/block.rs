@@ -1,5 +1,7 @@
 //! Blocks of spatially close objects: the units that executors schedule.
 
+use std::time::Duration;
+
 use glam::Vec3;
 
 use crate::behavior::batch::Order;
@@ -24,7 +26,7 @@ pub struct Block {
     extents: Extents,
     /// What the objects' updates take, in seconds.
     costs: Vec<f32>,
-    /// Some came since the objects were brought into their order.
+    /// Whether its objects may be in another order than theirs.
     disordered: bool,
 }
 
@@ -111,7 +113,16 @@ impl Block {
         }
     }
 
-    /// Brings its objects into their order, if some have come or gone, and says then where each was before.
+    /// Notes what an update took. Now and then is also when their order is looked at anew: messages may have changed
+    /// by what it is.
+    pub(crate) fn note_cost(&mut self, took: Duration) {
+        // Bodies that are advanced together have no time of their own.
+        let share = took / self.objects.len().max(1) as u32;
+        self.objects.iter_mut().for_each(|object| object.note_cost(share));
+        self.disordered = true;
+    }
+
+    /// Brings its objects into their order, if they may be in another, and says then where each was before.
     pub(crate) fn put_in_order(&mut self, order: &mut Vec<(Order, usize)>) {
         order.clear();
         if !std::mem::take(&mut self.disordered) {

@@ -168,10 +168,8 @@ impl Stages {
             block.objects[waiting.place].refresh(frame, self.simd);
         }
         *memory = received.emptied();
-        if let Some(took) = began.map(|began| began.elapsed()) {
-            // Bodies that are advanced together have no time of their own.
-            let share = took / block.objects.len().max(1) as u32;
-            block.objects.iter_mut().for_each(|object| object.note_cost(share));
+        if let Some(began) = began {
+            block.note_cost(began.elapsed());
         }
         block.refresh();
     }

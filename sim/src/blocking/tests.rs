@@ -10,6 +10,7 @@ use super::*;
 use crate::behavior::Fixed;
 use crate::behavior::batch::Order;
 use crate::geometry::{Geometry, Rigid};
+use crate::message::Message;
 use crate::object::{Group, ObjectId};
 use crate::scene::ParticleScene;
 use crate::simd::Simd;
@@ -88,6 +89,19 @@ fn who_came_is_put_in_order_and_found_where_it_was() {
         assert!(order.is_empty(), "it is in order");
     }
     assert!(disordered > 2, "{disordered}");
+}
+
+#[test]
+fn an_order_that_messages_change_is_looked_at_when_costs_are_noted() {
+    let (mut order, mut blocks) = (Vec::new(), regrouped());
+    let block = &mut blocks[0];
+    block.put_in_order(&mut order);
+    block.objects[3].process(&Message::Damping(0.0), 0);
+    let is_in_order = |block: &Block| block.objects().iter().map(Order::of).is_sorted();
+    assert!(!is_in_order(block));
+    block.note_cost(Duration::from_micros(1));
+    block.put_in_order(&mut order);
+    assert!(is_in_order(block));
 }
 
 #[test]
