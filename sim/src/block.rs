@@ -10,6 +10,14 @@ use crate::interaction::{Member, group_set};
 use crate::object::{Object, ObjectId};
 use crate::simd::{Isa, Kernel, LaneSet, Simd, first_lanes, lanes};
 
+/// A place of a block that is brought into its order: which object is to have it, and where that was before.
+#[derive(Debug)]
+pub(crate) struct Seat {
+    order: Order,
+    pub(crate) before: usize,
+    is_taken: bool,
+}
+
 /// One or more objects that go through the stages together: those that are advanced side by side one after the other.
 ///
 /// What every other block asks first, in every frame, is in its first cache line; what is asked of its objects where
@@ -24,7 +32,7 @@ pub struct Block {
     ids: Vec<ObjectId>,
     pub(crate) objects: Vec<Object>,
     extents: Extents,
-    /// What the objects' updates take, in seconds.
+    /// What the objects' updates take, in seconds, as was known before the last one.
     costs: Vec<f32>,
     /// Whether its objects may be in another order than theirs.
     disordered: bool,
@@ -71,7 +79,7 @@ impl Block {
         &self.extent
     }
 
-    /// The groups of its objects that may interact, a bit each.
+    /// The groups of its objects that may interact, a bit each; until the next update also of who has left.
     pub(crate) fn groups(&self) -> u32 {
         self.groups
     }
@@ -123,20 +131,24 @@ impl Block {
     }
 
     /// Brings its objects into their order, if they may be in another, and says then where each was before.
-    pub(crate) fn put_in_order(&mut self, order: &mut Vec<(Order, usize)>) {
+    pub(crate) fn put_in_order(&mut self, order: &mut Vec<Seat>) {
         order.clear();
         if !std::mem::take(&mut self.disordered) {
             return;
         }
-        order.extend(self.objects.iter().map(Order::of).zip(0..));
-        order.sort_unstable();
-        for place in 0..order.len() {
-            // What was there has been exchanged for others, as often as it was in the way.
-            let mut from = order[place].1;
-            while from < place {
-                from = order[from].1;
+        let seat = |(before, object)| Seat { order: Order::of(object), before, is_taken: false };
+        order.extend(self.objects.iter().enumerate().map(seat));
+        order.sort_unstable_by_key(|seat| seat.order);
+        for first in 0..order.len() {
+            // Round a cycle of those that take each other's seats; who had the first comes to the last.
+            let mut place = first;
+            while !std::mem::replace(&mut order[place].is_taken, true) {
+                let from = order[place].before;
+                if from != first {
+                    self.objects.swap(place, from);
+                }
+                place = from;
             }
-            self.objects.swap(place, from);
         }
     }
 

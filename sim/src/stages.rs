@@ -151,7 +151,7 @@ impl Stages {
         // Interactions found the objects where they were before.
         block.put_in_order(order);
         for (place, object) in block.objects.iter_mut().enumerate() {
-            let received = received.at(order.get(place).map_or(place, |&(_, before)| before));
+            let received = received.at(order.get(place).map_or(place, |seat| seat.before));
             if object.quarantined().is_some() {
                 continue;
             }
@@ -168,10 +168,10 @@ impl Stages {
             block.objects[waiting.place].refresh(frame, self.simd);
         }
         *memory = received.emptied();
+        block.refresh();
         if let Some(began) = began {
             block.note_cost(began.elapsed());
         }
-        block.refresh();
     }
 
     fn update_object<'m>(

@@ -47,7 +47,7 @@ impl Waiting {
     }
 }
 
-/// The order in which a block has its objects: those that are advanced together one after the other, and each with
+/// The order in which a block has its objects from an update on: those that are advanced together one after the other, and each with
 /// what makes as many substeps, as far as they stay as they are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Order {

@@ -2,7 +2,7 @@
 
 use super::received::Received;
 use super::{abreast, batch, spring_kernel};
-use crate::block::Block;
+use crate::block::{Block, Seat};
 
 /// Contact records of one object in one frame for which there is room from the start; usually 120, twice
 /// what the densest pile has, so that a frame need not allocate.
@@ -18,7 +18,7 @@ pub struct Workspace {
     pub(crate) received: Received<'static>,
     pub(crate) springs: SpringWork,
     /// Where the objects of a block that is brought into its order were before.
-    pub(crate) order: Vec<(batch::Order, usize)>,
+    pub(crate) order: Vec<Seat>,
 }
 
 /// What springs are advanced in.
@@ -29,6 +29,9 @@ pub(crate) struct SpringWork {
     /// Bodies whose springs are left to be advanced, as they come in their block.
     pub(crate) waiting: Vec<batch::Waiting>,
 }
+
+/// Objects for which there is room at least: a single one may be touched by more others than usual.
+const FEWEST_OBJECTS: usize = 4;
 
 /// How much room the updates of some blocks need.
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +46,7 @@ pub(crate) struct Room {
 impl Room {
     /// What these blocks need, now and when their objects are dealt out anew.
     pub(crate) fn of<'b>(blocks: impl Iterator<Item = &'b Block>) -> Self {
-        let mut room = Self { objects: 0, nodes: 0, abreast: 0 };
+        let mut room = Self { objects: FEWEST_OBJECTS, nodes: 0, abreast: 0 };
         for block in blocks {
             room.objects = room.objects.max(block.objects.capacity());
             let meshes = block.objects.iter().filter_map(|object| object.geometry.as_mesh());

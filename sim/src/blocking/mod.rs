@@ -167,9 +167,11 @@ impl Blocking {
         members.extend(solitary);
         let mut block_of = vec![0; objects.len()];
         assign(&mut block_of, &members);
-        let room = |members: &Members| members.ids.capacity();
+        let room = |(index, members): (usize, &Members)| {
+            if index < moving_blocks { room } else { members.ids.len() }
+        };
         let mut grouped: Vec<Vec<Object>> =
-            members.iter().map(room).map(Vec::with_capacity).collect();
+            members.iter().enumerate().map(room).map(Vec::with_capacity).collect();
         for object in objects {
             grouped[block_of[object.id().0 as usize] as usize].push(object);
         }

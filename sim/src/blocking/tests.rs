@@ -81,8 +81,8 @@ fn who_came_is_put_in_order_and_found_where_it_was() {
         let before: Vec<ObjectId> = block.ids().to_vec();
         block.put_in_order(&mut order);
         disordered += usize::from(!order.is_empty());
-        for (object, &(_, place)) in block.objects().iter().zip(&order) {
-            assert_eq!(object.id(), before[place]);
+        for (object, seat) in block.objects().iter().zip(&order) {
+            assert_eq!(object.id(), before[seat.before]);
         }
         assert!(block.objects().iter().map(Order::of).is_sorted());
         block.put_in_order(&mut order);
