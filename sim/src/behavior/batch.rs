@@ -47,8 +47,8 @@ impl Waiting {
     }
 }
 
-/// The order in which a block has its objects from an update on: those that are advanced together one after the other, and each with
-/// what makes as many substeps, as far as they stay as they are.
+/// The order in which a block has its objects from an update on: those that are advanced together one after the other,
+/// and each with what makes as many substeps, as far as they stay as they are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Order {
     /// Where a body's topology is in memory, whether it is damped, and its substeps.
