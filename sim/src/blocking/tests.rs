@@ -60,6 +60,7 @@ fn regrouped() -> Vec<Block> {
             object.note_cost(Duration::from_micros(u64::from(id % 97 + 1)));
         }
         block.refresh();
+        block.list_costs();
     }
     blocking.deal(&mut blocks, 2, 0.0);
     blocks
@@ -70,6 +71,7 @@ fn blocks_formed_anew_are_as_if_all_were_looked_at() {
     for mut block in regrouped() {
         let told = asked(&block);
         block.refresh();
+        block.list_costs();
         assert_eq!(asked(&block), told);
     }
 }
@@ -118,7 +120,7 @@ fn a_block_that_comes_elsewhere_keeps_its_objects() {
         // The later ones take longer.
         let took = Duration::from_micros(1 << index.min(20));
         block.objects.iter_mut().for_each(|object| object.note_cost(took));
-        block.refresh();
+        block.list_costs();
     }
     for _ in 0..2 {
         blocking.deal(&mut blocks, 1, 0.0);

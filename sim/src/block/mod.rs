@@ -1,14 +1,17 @@
 //! Blocks of spatially close objects: the units that executors schedule.
 
+mod extents;
+
 use std::time::Duration;
 
 use glam::Vec3;
 
+use self::extents::{Extents, Overlaps, OverlapsWithin, Reaches};
 use crate::behavior::batch::Order;
-use crate::geometry::{Bounds, Extent, LANES, Lanes, ROUNDING_MARGIN};
+use crate::geometry::{Bounds, Extent};
 use crate::interaction::{Member, group_set};
 use crate::object::{Object, ObjectId};
-use crate::simd::{Isa, Kernel, LaneSet, Simd, first_lanes, lanes};
+use crate::simd::Simd;
 
 /// A place of a block that is brought into its order: which object is to have it, and where that was before.
 #[derive(Debug)]
@@ -32,7 +35,7 @@ pub struct Block {
     ids: Vec<ObjectId>,
     pub(crate) objects: Vec<Object>,
     extents: Extents,
-    /// What the objects' updates take, in seconds, as was known before the last one.
+    /// What the objects' updates take, in seconds.
     costs: Vec<f32>,
     /// Whether its objects may be in another order than theirs.
     disordered: bool,
@@ -52,6 +55,7 @@ impl Block {
             ..Self::default()
         };
         block.refresh();
+        block.list_costs();
         block
     }
 
@@ -127,7 +131,14 @@ impl Block {
         // Bodies that are advanced together have no time of their own.
         let share = took / self.objects.len().max(1) as u32;
         self.objects.iter_mut().for_each(|object| object.note_cost(share));
+        self.list_costs();
         self.disordered = true;
+    }
+
+    /// Brings the list of costs up to date with the objects.
+    pub(crate) fn list_costs(&mut self) {
+        self.costs.clear();
+        self.costs.extend(self.objects.iter().map(Object::cost));
     }
 
     /// Brings its objects into their order, if they may be in another, and says then where each was before.
@@ -150,14 +161,13 @@ impl Block {
                 place = from;
             }
         }
+        self.list_costs();
     }
 
     /// Brings numbers, extents and groups up to date with the objects.
     pub(crate) fn refresh(&mut self) {
         self.ids.clear();
         self.ids.extend(self.objects.iter().map(Object::id));
-        self.costs.clear();
-        self.costs.extend(self.objects.iter().map(Object::cost));
         self.extents.resize(self.objects.len());
         self.groups = 0;
         let mut bounds = Bounds::EMPTY;
@@ -205,196 +215,14 @@ impl Block {
         if self.is_single() && other.is_single() {
             found.extend(self.extent.overlaps(&other.extent).then_some([0, 0]));
         } else {
-            simd.run(Overlaps { few: self, many: other, found });
+            let (few, many, around) = (&self.extents, &other.extents, &other.extent);
+            simd.run(Overlaps { few, many, around, found });
         }
     }
 
     /// Adds the places of every two of its objects whose extents overlap.
     pub(crate) fn overlaps_within(&self, simd: Simd, found: &mut Vec<[usize; 2]>) {
         simd.run(OverlapsWithin { extents: &self.extents, found });
-    }
-}
-
-/// Extents in whole lanes, padded with what is none.
-#[derive(Default)]
-pub(crate) struct Extents {
-    chunks: Vec<ExtentLanes>,
-    len: usize,
-}
-
-/// Boxes and spheres of as many objects as there are lanes.
-#[derive(Clone, Copy)]
-#[repr(align(64))]
-struct ExtentLanes {
-    min: [Lanes; 3],
-    max: [Lanes; 3],
-    center: [Lanes; 3],
-    radius: Lanes,
-}
-
-impl ExtentLanes {
-    /// As [`Extent::NONE`], in all lanes.
-    const NONE: Self = {
-        let none = [f32::NAN; LANES];
-        Self { min: [none; 3], max: [none; 3], center: [none; 3], radius: none }
-    };
-
-    /// Which extents overlap this one; as [`Extent::overlaps`].
-    #[inline(always)]
-    fn hits<I: Isa>(&self, isa: I, one: &Extent) -> LaneSet {
-        let mut hits = LaneSet::MAX;
-        for axis in 0..3 {
-            hits &= isa.at_most(isa.load(&self.min[axis]), isa.splat(one.bounds.max[axis]));
-            hits &= isa.at_most(isa.splat(one.bounds.min[axis]), isa.load(&self.max[axis]));
-        }
-        if hits == 0 {
-            return hits;
-        }
-        // Most boxes that overlap do so at a corner, where the spheres in them do not.
-        let mut square = isa.splat(0.0);
-        for axis in 0..3 {
-            let way = isa.sub(isa.load(&self.center[axis]), isa.splat(one.center[axis]));
-            square = isa.add(square, isa.mul(way, way));
-        }
-        let radii = isa.add(isa.load(&self.radius), isa.splat(one.radius));
-        let reach = isa.mul(radii, isa.splat(ROUNDING_MARGIN));
-        hits & isa.at_most(square, isa.mul(reach, reach))
-    }
-}
-
-impl Extents {
-    /// Makes room for so many extents; if there were as many before, they stay.
-    fn resize(&mut self, len: usize) {
-        if self.len != len {
-            self.chunks.clear();
-            self.chunks.resize(len.div_ceil(LANES), ExtentLanes::NONE);
-            self.len = len;
-        }
-    }
-
-    /// None, with room for so many.
-    fn with_capacity(len: usize) -> Self {
-        Self { chunks: Vec::with_capacity(len.div_ceil(LANES)), len: 0 }
-    }
-
-    fn push(&mut self, extent: &Extent) {
-        if self.len == self.chunks.len() * LANES {
-            self.chunks.push(ExtentLanes::NONE);
-        }
-        self.len += 1;
-        self.set(self.len - 1, extent);
-    }
-
-    /// Puts the last one to `place`, whose own is gone then.
-    fn swap_remove(&mut self, place: usize) {
-        let last = self.len - 1;
-        self.set(place, &self.at(last));
-        self.set(last, &Extent::NONE);
-        self.len = last;
-        self.chunks.truncate(last.div_ceil(LANES));
-    }
-
-    fn set(&mut self, place: usize, extent: &Extent) {
-        let (chunk, lane) = (&mut self.chunks[place / LANES], place % LANES);
-        for axis in 0..3 {
-            chunk.min[axis][lane] = extent.bounds.min[axis];
-            chunk.max[axis][lane] = extent.bounds.max[axis];
-            chunk.center[axis][lane] = extent.center[axis];
-        }
-        chunk.radius[lane] = extent.radius;
-    }
-
-    /// The middle of what is at `place`.
-    fn center(&self, place: usize) -> Vec3 {
-        let (chunk, lane) = (&self.chunks[place / LANES], place % LANES);
-        Vec3::from_array([0, 1, 2].map(|axis| chunk.center[axis][lane]))
-    }
-
-    /// The extent at `place`.
-    #[inline(always)]
-    fn at(&self, place: usize) -> Extent {
-        let (chunk, lane) = (&self.chunks[place / LANES], place % LANES);
-        let vector = |lanes: &[Lanes; 3]| Vec3::new(lanes[0][lane], lanes[1][lane], lanes[2][lane]);
-        Extent {
-            center: vector(&chunk.center),
-            radius: chunk.radius[lane],
-            ..Extent::of_box(Bounds { min: vector(&chunk.min), max: vector(&chunk.max) })
-        }
-    }
-
-    /// Adds `place` with the places of all that overlap the extent `one`.
-    #[inline(always)]
-    fn overlaps<I: Isa>(&self, isa: I, place: usize, one: &Extent, found: &mut Vec<[usize; 2]>) {
-        for (index, chunk) in self.chunks.iter().enumerate() {
-            let others = lanes(chunk.hits(isa, one));
-            found.extend(others.map(|lane| [place, index * LANES + lane]));
-        }
-    }
-}
-
-/// The test whether any extent overlaps one.
-struct Reaches<'a> {
-    extents: &'a Extents,
-    extent: &'a Extent,
-}
-
-impl Kernel for Reaches<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<I: Isa>(self, isa: I) -> bool {
-        self.extents.chunks.iter().any(|chunk| chunk.hits(isa, self.extent) != 0)
-    }
-}
-
-/// The search for overlaps of the extents of two blocks.
-struct Overlaps<'a> {
-    few: &'a Block,
-    many: &'a Block,
-    found: &'a mut Vec<[usize; 2]>,
-}
-
-impl Kernel for Overlaps<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Isa>(self, isa: I) {
-        let Self { few, many, found } = self;
-        if few.is_single() {
-            many.extents.overlaps(isa, 0, &few.extent, found);
-            return;
-        }
-        for (index, chunk) in few.extents.chunks.iter().enumerate() {
-            for place in lanes(chunk.hits(isa, &many.extent)).map(|lane| index * LANES + lane) {
-                many.extents.overlaps(isa, place, &few.extents.at(place), found);
-            }
-        }
-    }
-}
-
-/// The search for overlaps of the extents of one block.
-struct OverlapsWithin<'a> {
-    extents: &'a Extents,
-    found: &'a mut Vec<[usize; 2]>,
-}
-
-impl Kernel for OverlapsWithin<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Isa>(self, isa: I) {
-        let Self { extents, found } = self;
-        for place in 0..extents.len {
-            let one = extents.at(place);
-            // Each pair once: with those after it.
-            let first = place + 1;
-            for (index, chunk) in extents.chunks.iter().enumerate().skip(first / LANES) {
-                let start = index * LANES;
-                let later = !first_lanes(first.saturating_sub(start));
-                let others = lanes(chunk.hits(isa, &one) & later);
-                found.extend(others.map(|lane| [place, start + lane]));
-            }
-        }
     }
 }
 
