@@ -13,13 +13,11 @@ use glam::Vec3;
 use crate::behavior::{Input, SpringWork, Workspace, batch};
 use crate::block::Block;
 use crate::cost::is_timed;
-use crate::interaction::{
-    ContactBuffer, ContactRecord, Member, PairScratch, Rules, Scratch, Segment,
-};
+use crate::interaction::{ContactBuffer, ContactRecord, PairScratch, Rules, Scratch, Segment};
 use crate::message::Message;
 use crate::object::{Drawing, Fault, FaultKind, Object, ObjectId};
 use crate::render::Renderer;
-use crate::simd::Simd;
+use crate::simd::{Simd, prefetch};
 
 /// What the interaction stage counted. Independent of blocking and executor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -92,8 +90,7 @@ impl Stages {
         let Scratch { pairs, pair } = scratch;
         pairs.clear();
         few.overlaps(self.simd, many, pairs);
-        let objects = pairs.iter().map(|&[one, other]| [few.member(one), many.member(other)]);
-        self.interact_pairs(objects, pair, results)
+        self.interact_pairs([few, many], pairs, pair, results)
     }
 
     /// Lets the objects within one block interact with each other, likewise.
@@ -106,18 +103,28 @@ impl Stages {
         let Scratch { pairs, pair } = scratch;
         pairs.clear();
         block.overlaps_within(self.simd, pairs);
-        let objects = pairs.iter().map(|places| places.map(|place| block.member(place)));
-        self.interact_pairs(objects, pair, results)
+        self.interact_pairs([block; 2], pairs, pair, results)
     }
 
-    fn interact_pairs<'o>(
+    /// Lets pairs of objects interact, given by their places in these blocks.
+    fn interact_pairs(
         &self,
-        pairs: impl Iterator<Item = [Member<'o>; 2]>,
+        [first, second]: [&Block; 2],
+        pairs: &[[usize; 2]],
         scratch: &mut PairScratch,
         results: &mut ContactBuffer,
     ) -> PairCount {
         let mut count = PairCount::default();
-        for [a, b] in pairs {
+        let members = |&[one, other]: &[usize; 2]| [first.member(one), second.member(other)];
+        for (index, pair) in pairs.iter().enumerate() {
+            // Of another block's objects the nodes are in no near cache; nor, with many objects, of any block's.
+            let later = |ahead: usize| pairs.get(index + ahead).map(members).into_iter().flatten();
+            later(2).for_each(|member| prefetch(member.object));
+            for mesh in later(1).filter_map(|member| member.object.geometry.as_mesh()) {
+                let [positions, _] = mesh.lines();
+                prefetch(positions);
+            }
+            let [a, b] = members(pair);
             if let Some((pair, bodies)) = self.rules.find(a, b) {
                 let touched = scratch.interact(pair, bodies, self, results);
                 count += PairCount { candidates: 1, collisions: u64::from(touched) };
@@ -150,7 +157,9 @@ impl Stages {
         received.extend(block, results);
         // Interactions found the objects where they were before.
         block.put_in_order(order);
-        for (place, object) in block.objects.iter_mut().enumerate() {
+        for place in 0..block.objects.len() {
+            block.prefetch_after(place);
+            let object = &mut block.objects[place];
             let received = received.at(order.get(place).map_or(place, |seat| seat.before));
             if object.quarantined().is_some() {
                 continue;

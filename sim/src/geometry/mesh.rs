@@ -210,6 +210,11 @@ impl Mesh {
         self.velocities.copy_from(&other.velocities);
     }
 
+    /// Where positions and velocities are in memory.
+    pub(crate) fn lines(&self) -> [&[Line]; 2] {
+        [self.positions.lines(), self.velocities.lines()]
+    }
+
     /// The parts a kernel works on, all borrowed at once.
     pub(crate) fn kernel_parts(&mut self) -> KernelParts<'_> {
         KernelParts {

@@ -100,6 +100,11 @@ impl Vectors {
         components_mut(&mut self.lines)
     }
 
+    /// The components one after the other.
+    pub(crate) fn lines(&self) -> &[Line] {
+        &self.lines
+    }
+
     /// The components one after the other, to be replaced.
     #[inline(always)]
     pub(crate) fn lines_mut(&mut self) -> &mut [Line] {

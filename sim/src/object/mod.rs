@@ -13,7 +13,7 @@ use crate::behavior::{Behavior, Fixed};
 use crate::cost::Cost;
 use crate::geometry::{Bounds, Extent, Geometry};
 use crate::message::Message;
-use crate::simd::Simd;
+use crate::simd::{Simd, prefetch};
 
 pub use fault::{Fault, FaultKind};
 pub use visual::{Drawing, VisualProperties};
@@ -189,6 +189,15 @@ impl Object {
             self.fit(extent);
         } else {
             self.quarantine(Fault { kind: FaultKind::NonFinite, frame });
+        }
+    }
+
+    /// Asks for what an update reads of it beside the object itself.
+    #[inline]
+    pub(crate) fn prefetch_parts(&self) {
+        prefetch(&*self.behavior);
+        if let Some(mesh) = self.geometry.as_mesh() {
+            mesh.lines().into_iter().for_each(prefetch);
         }
     }
 
