@@ -12,6 +12,7 @@ use dualframe_sim::experiment::race::{Race, Runner, WARM_UP};
 use dualframe_sim::experiment::speedup::efficiency;
 use dualframe_sim::experiment::statistics::Quartiles;
 use dualframe_sim::experiment::subject::Subject;
+use dualframe_sim::experiment::timing::Rounds;
 use dualframe_sim::scene::ParticleScene;
 
 /// Measurements of what threads without anything in common gain.
@@ -44,7 +45,7 @@ fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
             let outcome = race.run(&runners, &mut || calibrator.phase(), &mut || ())?;
             common::print(&race.to_string(), &outcome.series, race.frames as f64);
             let without = without.get_or_insert_with(|| outcome.clone());
-            let share = 100.0 * outcome.render_share(without).unwrap_or(f64::NAN);
+            let share = 100.0 * outcome.render_share(Rounds::Good, without).unwrap_or(f64::NAN);
             let over = |other| outcome.median_speed_up(pipeline, other).unwrap_or(f64::NAN);
             let (s_s, s_p) = (over(Runner::SERIAL), over(one));
             // The lowest of the medians: a minimum within each round would favour whichever

@@ -77,6 +77,11 @@ fn environment(
             run.frames += 1;
         })?;
         let took = began.elapsed().as_secs_f64() / frames as f64;
+        // Frames without them would be shorter.
+        let quarantined = session.manager.quarantined().len();
+        if quarantined > 0 {
+            return Err(ExperimentError::Quarantined { run: runner.label(), objects: quarantined });
+        }
         let Count { collisions, frames } = count.get();
         count.set(Count { collisions: collisions + run.collisions, frames: frames + run.frames });
         Ok(took)

@@ -11,6 +11,7 @@ use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::load::{RenderLoad, StandIn};
 use dualframe_sim::experiment::race::{Race, Runner, WARM_UP};
 use dualframe_sim::experiment::subject::Subject;
+use dualframe_sim::experiment::timing::Rounds;
 use dualframe_sim::render::NullRenderer;
 
 /// Objects updated in a run: 240 frames, 4 s of the operation.
@@ -35,7 +36,8 @@ fn retraction(arguments: &common::Arguments) -> Result<(), ExperimentError> {
         let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };
         let outcome = race.run(&runners, &mut || calibrator.phase(), &mut || ())?;
         common::print(&race.to_string(), &outcome.series, race.frames as f64);
-        let share = outcome.render_share(without.get_or_insert_with(|| outcome.clone()));
+        let without = without.get_or_insert_with(|| outcome.clone());
+        let share = outcome.render_share(Rounds::Good, without);
         println!("rendering: {:.1} % of the serial work", 100.0 * share.unwrap_or(f64::NAN));
         println!("speed-up of {} over", pipeline.label());
         for &other in runners.iter().filter(|&&other| other != pipeline) {
@@ -44,7 +46,7 @@ fn retraction(arguments: &common::Arguments) -> Result<(), ExperimentError> {
         }
     }
     costs(&subject, frames)?;
-    println!("\nseconds in {frames} frames, each worker");
+    println!("\nseconds in the first {frames} frames, each worker");
     for &runner in &runners {
         for (worker, seconds) in stage_seconds(&subject, runner, frames)?.iter().enumerate() {
             let StageSeconds { broad_phase, interaction, update, render, idle } = seconds;
@@ -58,7 +60,8 @@ fn retraction(arguments: &common::Arguments) -> Result<(), ExperimentError> {
     Ok(())
 }
 
-/// Prints what the dearest objects' updates take: no frame can be shorter than the dearest of them.
+/// Prints what the dearest objects' updates take in the last frames, none of which can be shorter than the dearest of
+/// them.
 fn costs(subject: &Subject, frames: u64) -> Result<(), ExperimentError> {
     let mut session = subject.start(Runner::SERIAL)?;
     session.run(WARM_UP + frames, &mut NullRenderer::new(), &mut |_| ())?;
@@ -66,7 +69,8 @@ fn costs(subject: &Subject, frames: u64) -> Result<(), ExperimentError> {
     session.manager.visit(&mut |object| costs.push((object.cost(), object.id())));
     costs.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
     let all: f32 = costs.iter().map(|(cost, _)| cost).sum();
-    println!("\nupdates of {} objects take {:.0} µs a frame; the dearest", costs.len(), all * 1e6);
+    let (objects, all_us) = (costs.len(), all * 1e6);
+    println!("\nupdates of {objects} objects take {all_us:.0} µs a frame at the end; the dearest");
     for (cost, id) in costs.iter().take(DEAREST) {
         println!("{id:>8}{:8.0} µs{:7.1} %", cost * 1e6, 100.0 * cost / all);
     }

@@ -31,15 +31,27 @@ pub(super) fn run(args: &ExperimentArgs) -> Result<Findings, ExperimentError> {
     findings
 }
 
-/// Prints what was found.
-pub(super) fn print(reports: &[Report], args: &ExperimentArgs) -> Result<(), RunError> {
-    outputs::print(|out| lines(out, reports, args))
+/// Prints what was found, and where the page is if it was written.
+pub(super) fn print(
+    reports: &[Report],
+    written: bool,
+    args: &ExperimentArgs,
+) -> Result<(), RunError> {
+    outputs::print(|out| lines(out, reports, written, args))
 }
 
-fn lines(out: &mut impl Write, reports: &[Report], args: &ExperimentArgs) -> io::Result<()> {
+fn lines(
+    out: &mut impl Write,
+    reports: &[Report],
+    written: bool,
+    args: &ExperimentArgs,
+) -> io::Result<()> {
     writeln!(out, "{}; seed {}", Machine::this(), args.plan().seed)?;
     for figure in reports.iter().flat_map(|report| &report.figures) {
         writeln!(out, "{}: {}", figure.title, figure.finding)?;
     }
-    writeln!(out, "see {}", args.out.join(PAGE).display())
+    if written {
+        writeln!(out, "see {}", args.out.join(PAGE).display())?;
+    }
+    Ok(())
 }

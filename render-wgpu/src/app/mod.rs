@@ -61,7 +61,7 @@ fn run_experiments(args: &ExperimentArgs) -> ExitCode {
     match experiment::run(args) {
         Ok(Findings { reports, written, ended }) => {
             if !reports.is_empty() {
-                told.attempt(experiment::print(&reports, args));
+                told.attempt(experiment::print(&reports, written.is_ok(), args));
             }
             for error in [written, ended].into_iter().filter_map(Result::err) {
                 told.note(&with_causes(&error));

@@ -10,6 +10,7 @@ use dualframe_sim::experiment::error::ExperimentError;
 use dualframe_sim::experiment::machine::Machine;
 use dualframe_sim::experiment::statistics::Quartiles;
 use dualframe_sim::experiment::timing::{self, Rounds, Series};
+use dualframe_sim::scene::ParticleScene;
 
 /// The arguments of a bench.
 #[derive(Parser)]
@@ -22,7 +23,12 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) frames: Option<u64>,
     /// Numbers of particles; of no effect where there are none.
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
+    #[arg(
+        long,
+        value_name = "N,N,...",
+        value_delimiter = ',',
+        value_parser = at_least_one(ParticleScene::MAX_OBJECTS as u64),
+    )]
     pub(crate) objects: Vec<usize>,
     /// Threads of the parallel executors; of no effect where there are none.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = at_least_one(MAX_THREADS as u64))]

@@ -97,7 +97,7 @@ mod tests {
             let waits = || scope.spawn(|| barrier.wait());
             let waiting = [waits(), waits()];
             let panics = scope.spawn(|| {
-                let _guard = OnPanic(|| barrier.break_off());
+                let _guard = OnPanic::new(|| barrier.break_off());
                 panic!("on purpose");
             });
             assert!(panics.join().is_err());

@@ -173,7 +173,8 @@ pub trait Executor: Send {
     /// Advances by `frames` frames. Every frame's objects go to the renderer, then the frame is
     /// swapped and `on_frame` is told, in the order of the frames; when this returns, all of them are
     /// swapped. The renderer is called by one thread at a time, and by the calling thread only if it
-    /// [is bound](Renderer::is_bound) to that.
+    /// [is bound](Renderer::is_bound) to that. A caller that is a thread of a Rayon pool may be given other jobs of that
+    /// pool before this returns, and must hold nothing that they wait for.
     ///
     /// # Errors
     /// More than 512 blocks, of which more than 63 threads are the usual cause, crowd so fast that the pipeline's

@@ -20,7 +20,8 @@ use crate::timeline::Timeline;
 
 /// As [`RayonExecutor`], but every update also copies what a renderer sees, and the calling thread
 /// renders that copy while the pool computes the next frame: rendering overlaps without the pipeline. The calling
-/// thread is one more than the pool's. Callbacks must not use rayon, as there.
+/// thread is one more than the pool's, and each call starts another, which waits for the pool. Callbacks must not use
+/// rayon, as there.
 ///
 /// [`RayonExecutor`]: super::RayonExecutor
 pub struct RayonOverlappedExecutor {

@@ -194,7 +194,7 @@ impl Shared {
 
     /// One thread's share of a frame.
     fn compute(&self, worker: usize, own: &mut Own) {
-        let _guard = OnPanic(|| self.barrier.break_off());
+        let _guard = OnPanic::new(|| self.barrier.break_off());
         self.broad_phase(worker);
         self.barrier.wait();
         if worker == 0 {

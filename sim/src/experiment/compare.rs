@@ -7,6 +7,7 @@ use super::outcome::{Outcome, marked};
 use super::plan::Plan;
 use super::race::{Race, Runner, WARM_UP};
 use super::subject::Subject;
+use super::timing::Rounds;
 use super::{Laboratory, Report};
 use crate::executor::ExecutorKind;
 use crate::scene::ParticleScene;
@@ -145,7 +146,7 @@ impl Study<'_> {
         };
         let share = match outcome.race.load {
             RenderLoad::Null => None,
-            RenderLoad::StandIn(_) => outcome.render_share(without),
+            RenderLoad::StandIn(_) => outcome.render_share(Rounds::Good, without),
         };
         let [in_title, rendering] = share.map(rendering).unwrap_or_default();
         let frames = outcome.race.timed() + ". ";

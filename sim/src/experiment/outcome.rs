@@ -88,12 +88,16 @@ impl Outcome {
     }
 
     /// What share of the serial version's work rendering is, if `without` is the same race without it: by the medians
-    /// of what it takes in the good rounds of either, or in all where none is good.
+    /// of what it takes in these rounds of either, all where none is good.
     #[must_use]
-    pub fn render_share(&self, without: &Self) -> Option<f64> {
+    pub fn render_share(&self, which: Rounds, without: &Self) -> Option<f64> {
         let seconds = |outcome: &Self| {
             let serial = outcome.index(Runner::SERIAL)?;
-            Some(outcome.series.seconds(outcome.series.best_rounds(), serial)?.median)
+            let which = match which {
+                Rounds::All => Rounds::All,
+                Rounds::Good => outcome.series.best_rounds(),
+            };
+            Some(outcome.series.seconds(which, serial)?.median)
         };
         Some(1.0 - seconds(without)? / seconds(self)?)
     }
@@ -124,10 +128,10 @@ impl Outcome {
     /// Adds two rows for each runner: over all rounds, and over the good ones if there are any. `without` is the same
     /// race without rendering, this one if it has none.
     pub fn add_summary(&self, without: &Self, table: &mut Table) {
-        let share = self.render_share(without);
         let all = self.series.rounds().len();
         let good = all - self.series.marked();
         for (which, name, count) in [(Rounds::All, "all", all), (Rounds::Good, "good", good)] {
+            let share = self.render_share(which, without);
             for &runner in &self.runners {
                 self.add_summary_row(table, share, runner, (which, name, count));
             }
@@ -142,7 +146,9 @@ impl Outcome {
         (which, name, count): (Rounds, &str, usize),
     ) {
         let seconds = self.index(runner).and_then(|index| self.series.seconds(which, index));
-        let Some(seconds) = seconds else { return };
+        let Some((seconds, throughput)) = seconds.zip(self.throughput(which, runner)) else {
+            return;
+        };
         let one = Runner { threads: 1, ..runner };
         let (s_s, s_p) =
             (self.speed_up(which, runner, Runner::SERIAL), self.speed_up(which, runner, one));
@@ -161,7 +167,7 @@ impl Outcome {
             &format_args!("{:.6}", seconds.lower),
             &format_args!("{:.6}", seconds.median),
             &format_args!("{:.6}", seconds.upper),
-            &format_args!("{:.2}", self.race.frames as f64 / seconds.median),
+            &format_args!("{:.2}", throughput.median),
             &cell(s_s.map(|ratio| ratio.lower)),
             &cell(s_s.map(|ratio| ratio.median)),
             &cell(s_s.map(|ratio| ratio.upper)),
@@ -223,13 +229,19 @@ pub(super) mod tests {
         seconds: &[(Runner, f64)],
         gains: &[f64],
     ) -> Outcome {
+        let seconds: Vec<_> = seconds.iter().map(|&(runner, each)| (runner, vec![each])).collect();
+        outcome_by_rounds(frames, &seconds, gains)
+    }
+
+    /// The same where each runner takes these seconds in round after round, and then again.
+    fn outcome_by_rounds(frames: u64, seconds: &[(Runner, Vec<f64>)], gains: &[f64]) -> Outcome {
         let subject = Subject::Particles(ParticleScene::new(4));
         let rounds = gains.len() - 1..=gains.len() - 1;
         let (load, warm_up) = (RenderLoad::Null, 0);
-        let contender = |&(runner, seconds): &(Runner, f64)| Contender {
-            label: runner.label(),
-            spins: false,
-            run: Box::new(move || Ok::<_, ExperimentError>(seconds)),
+        let contender = |(runner, seconds): &(Runner, Vec<f64>)| {
+            let (label, mut seconds) = (runner.label(), seconds.clone().into_iter().cycle());
+            let run = move || Ok::<_, ExperimentError>(seconds.next().expect("some"));
+            Contender { label, spins: false, run: Box::new(run) }
         };
         let mut contenders: Vec<_> = seconds.iter().map(contender).collect();
         let mut gains = gains.iter();
@@ -270,10 +282,25 @@ pub(super) mod tests {
         let one = Runner::pipeline(1);
         let without = outcome(1, &[(one, 1.0), (Runner::SERIAL, 3.0)], &[2.0; 4]);
         let with = outcome(1, &[(Runner::SERIAL, 4.0), (one, 9.0)], &[2.0; 4]);
-        assert_eq!(with.render_share(&without), Some(0.25));
-        assert_eq!(without.render_share(&without), Some(0.0));
+        assert_eq!(with.render_share(Rounds::Good, &without), Some(0.25));
+        assert_eq!(without.render_share(Rounds::Good, &without), Some(0.0));
         let unknown = outcome(1, &[(one, 1.0)], &[2.0; 4]);
-        assert_eq!(with.render_share(&unknown), None);
+        assert_eq!(with.render_share(Rounds::Good, &unknown), None);
+    }
+
+    #[test]
+    fn a_row_is_of_its_own_rounds() {
+        let run = |seconds: [f64; 3]| {
+            // The last round is marked.
+            outcome_by_rounds(12, &[(Runner::SERIAL, seconds.to_vec())], &[2.0, 2.0, 2.0, 1.0])
+        };
+        let (without, with) = (run([3.0, 3.0, 6.0]), run([4.0, 6.0, 12.0]));
+        let mut table = Outcome::summary_table("summary");
+        with.add_summary(&without, &mut table);
+        let seen = |row: usize| [2, 7, 10, 12].map(|column| table.rows[row][column].as_str());
+        assert_eq!(seen(0), ["0.5000", "all", "6.000000", "2.00"]);
+        // The median of 3 and 2; by the median of seconds it would be 2.4.
+        assert_eq!(seen(1), ["0.4000", "good", "5.000000", "2.50"]);
     }
 
     #[test]

@@ -77,7 +77,7 @@ impl Frames {
         header.extend(names.iter().map(String::as_str));
         let mut table = Table::new("per-frame", &header);
         for (frame, collisions) in self.collisions.iter().enumerate() {
-            let mut row = vec![frame.to_string(), collisions.to_string()];
+            let mut row = vec![(frame + 1).to_string(), collisions.to_string()];
             row.extend(self.speed_ups.iter().map(|(_, values)| format!("{:.4}", values[frame])));
             table.rows.push(row);
         }
@@ -100,9 +100,9 @@ impl Frames {
     }
 
     fn collision_figure(&self) -> Result<Figure, ExperimentError> {
-        let point = |(frame, &count): (usize, &u64)| (frame as f64, count as f64);
-        let points = self.collisions.iter().enumerate().map(point).collect();
-        let counts = || self.collisions.iter().enumerate();
+        // The first frame is number 1, as everywhere.
+        let counts = || (1..).zip(&self.collisions);
+        let points = counts().map(|(frame, &count)| (f64::from(frame), count as f64)).collect();
         let (busiest, most) = counts().max_by_key(|&(_, count)| count).unwrap_or((0, &0));
         let (calmest, fewest) = counts().min_by_key(|&(_, count)| count).unwrap_or((0, &0));
         Chart {
@@ -123,7 +123,7 @@ impl Frames {
         let shown = self.speed_ups.iter().filter(|(threads, _)| counts.contains(threads));
         let lines = shown.enumerate().map(|(color, (threads, values))| Line {
             label: named(*threads),
-            points: values.iter().enumerate().map(|(f, &value)| (f as f64, value)).collect(),
+            points: (1..).map(f64::from).zip(values.iter().copied()).collect(),
             color,
             ..Line::default()
         });
@@ -165,7 +165,7 @@ mod tests {
         let frames = Frames { outcome, collisions: vec![7, 5], speed_ups };
         assert_eq!(
             frames.table().rows,
-            [["0", "7", "1.0000", "2.0000"], ["1", "5", "1.0000", "3.0000"]]
+            [["1", "7", "1.0000", "2.0000"], ["2", "5", "1.0000", "3.0000"]]
         );
         let summary = frames.summary();
         assert_eq!(summary.rows[1], ["2", "2.25000", "2.50000", "2.75000", "3.00000", "0.25000"]);

@@ -1,5 +1,6 @@
 //! How large an experiment is.
 
+use super::machine::Machine;
 use super::subject::RETRACTION_WORK;
 use crate::executor::MAX_THREADS;
 use crate::pool::cores;
@@ -37,7 +38,7 @@ pub struct Retraction {
 }
 
 impl Retraction {
-    /// On so many cores, of which one is left free as for haptics if there are more than two, as in the paper
+    /// On so many whole cores, of which one is left free as for haptics if there are more than two, as in the paper
     /// (Fig. 18).
     fn on(cores: usize, frames: u64, rounds: usize) -> Self {
         let keeps_core = cores > 2;
@@ -71,7 +72,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The paper's sizes, on every number of threads up to the number of cores.
+    /// The paper's sizes, on every number of threads up to as many as the machine runs at once.
     #[must_use]
     pub fn full() -> Self {
         let hundreds: Vec<usize> = (100..=1_000).step_by(100).collect();
@@ -82,7 +83,7 @@ impl Plan {
             load_balance: Sweep { objects: hundreds, frames: 800, rounds: 7 },
             per_frame: Sweep { objects: vec![300], frames: 600, rounds: 15 },
             compare: Sweep { objects: vec![100, 1_000], frames: 400, rounds: 15 },
-            retraction: Retraction::on(cores(), 1_000, 7),
+            retraction: Retraction::on(whole_cores(), 1_000, 7),
         }
     }
 
@@ -94,7 +95,7 @@ impl Plan {
             load_balance: Sweep { objects: vec![100, 500, 1_000], frames: 200, rounds: 3 },
             per_frame: Sweep { objects: vec![300], frames: 600, rounds: 5 },
             compare: Sweep { objects: vec![100, 1_000], frames: 100, rounds: 5 },
-            retraction: Retraction::on(cores(), 100, 3),
+            retraction: Retraction::on(whole_cores(), 100, 3),
             ..Self::full()
         }
     }
@@ -104,6 +105,13 @@ impl Plan {
     pub fn most_threads(&self) -> usize {
         self.threads.iter().copied().max().unwrap_or(1)
     }
+}
+
+/// The cores of this machine, as far as is known: what a second hardware thread of one does, haptics on the first would
+/// feel.
+fn whole_cores() -> usize {
+    let Machine { cores, threads, .. } = Machine::this();
+    cores.unwrap_or(threads)
 }
 
 #[cfg(test)]

@@ -95,7 +95,7 @@ impl<W: Write> Recorder<W> {
         let end = manager.frame().saturating_add(frames);
         let journal = Arc::clone(&self.journal);
         // What a panic leaves could not be repeated, as what an error does.
-        let _guard = OnPanic(|| journal.lock().unwrap_or_else(PoisonError::into_inner).end());
+        let _guard = OnPanic::new(|| journal.lock().unwrap_or_else(PoisonError::into_inner).end());
         loop {
             let frame = manager.frame();
             let piece = frames_to_checkpoint(frame).min(end - frame);

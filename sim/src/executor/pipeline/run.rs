@@ -242,7 +242,7 @@ impl<'s> Context<'s, '_> {
         self.crew.report();
         let mut last = 0;
         while let Some(run) = self.crew.await_run(last, self.pool, index) {
-            let _guard = OnPanic(|| self.crew.abort());
+            let _guard = OnPanic::new(|| self.crew.abort());
             let pipeline = read(pipeline);
             self.work(index, &pipeline, &host, None);
             // Whoever left because fewer were wanted may be wanted again in the same batch.
