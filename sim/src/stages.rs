@@ -172,10 +172,7 @@ impl Stages {
             let given = Given { frame, place, received, springs: &mut *springs };
             self.update_object(object, given, own_mail, post);
         }
-        batch::advance(&mut block.objects, springs, self.simd);
-        for waiting in springs.waiting.drain(..) {
-            block.objects[waiting.place].refresh(frame, self.simd);
-        }
+        batch::advance(&mut block.objects, springs, frame, self.simd);
         *memory = received.emptied();
         block.refresh();
         if let Some(began) = began {
@@ -221,7 +218,7 @@ impl Stages {
                 }
             }
             if waits {
-                // Its springs are advanced with those of others, and then it is refreshed.
+                // Its springs are advanced with those of others, and its extent with them.
             } else if began.is_some_and(|(began, budget)| began.elapsed() > budget) {
                 object.quarantine(Fault { kind: FaultKind::OverBudget, frame });
             } else if object.quarantined().is_none() && (changed || !object.is_finite()) {

@@ -9,13 +9,14 @@ use std::time::{Duration, Instant};
 use common::{Acting, executors, hash_without, no_rules, particles, point, run, serial, springs};
 use dualframe_sim::behavior::{Fixed, Input};
 use dualframe_sim::blocking::Grain;
-use dualframe_sim::executor::Executor;
+use dualframe_sim::executor::{Entry, Executor, PipelineExecutor};
 use dualframe_sim::geometry::{Geometry, Mesh, Rigid, Topology};
 use dualframe_sim::interaction::{
     Detection, InteractionPair, NodeSpheres, Penalty, Rules, Touches,
 };
 use dualframe_sim::message::{Custom, Message};
 use dualframe_sim::object::{FaultKind, Group, Object, ObjectId};
+use dualframe_sim::pool::Pool;
 use dualframe_sim::scene::Scene;
 use glam::{Quat, Vec3};
 use parry3d::bounding_volume::{Aabb, BoundingSphere};
@@ -162,14 +163,44 @@ impl Shape for Boxless {
     }
 }
 
+fn boxless() -> Geometry {
+    Geometry::Rigid(Rigid::new(SharedShape::new(Boxless(Ball::new(0.1))), Pose::IDENTITY))
+}
+
 /// A host's own shape is asked for its box after the update, and that may panic, too.
 #[test]
 fn a_shapes_panic() {
-    let worst = |geometry: &mut Geometry| {
-        let shape = SharedShape::new(Boxless(Ball::new(0.1)));
-        *geometry = Geometry::Rigid(Rigid::new(shape, Pose::IDENTITY));
+    only_the_culprit_goes(|geometry| *geometry = boxless(), FaultKind::Panicked);
+}
+
+/// Whoever takes over the objects, or forms blocks of them anew, asks for their boxes.
+#[test]
+fn a_shapes_panic_between_runs() {
+    let from_the_start = || {
+        let mut scene = crowd(|_| {});
+        scene.objects[CULPRIT.0 as usize] = Object::new(CULPRIT, Group(0), boxless(), Fixed);
+        scene
     };
-    only_the_culprit_goes(worst, FaultKind::Panicked);
+    let in_a_run = || crowd(|geometry| *geometry = boxless());
+    let scenes: [(&dyn Fn() -> Scene, u64); 2] = [(&from_the_start, 0), (&in_a_run, FATAL_FRAME)];
+    for (scene, frame) in scenes {
+        let expected = [(CULPRIT, FaultKind::Panicked, frame)];
+        for (name, mut executor) in executors(scene, Grain::Spatial, 2) {
+            run(&mut *executor, FATAL_FRAME + 1);
+            let mut next = serial(executor.into_scene());
+            run(&mut next, 1);
+            assert_eq!(quarantined(&next), expected, "after {name}");
+        }
+        let pool = Arc::new(Pool::new(1, false));
+        let (grain, entry) = (Grain::Spatial, Entry::default());
+        let executor = PipelineExecutor::new(scene(), grain, entry, Arc::clone(&pool));
+        let mut executor = executor.map_err(|refused| refused.to_string()).expect("a valid scene");
+        run(&mut executor, FATAL_FRAME + 1);
+        // More threads than blocks were formed for.
+        pool.resize(8);
+        run(&mut executor, 1);
+        assert_eq!(quarantined(&executor), expected);
+    }
 }
 
 #[test]

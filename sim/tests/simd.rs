@@ -117,10 +117,12 @@ fn body(seed: u64) -> Object {
     body_of(&make, 0, &mut random)
 }
 
-/// The bits of a body's positions and velocities.
+/// The bits of a body's positions, velocities, box and middle.
 fn bits(object: &Object) -> Vec<u32> {
     let mesh = object.geometry.as_mesh().expect("a body");
-    let vectors = mesh.positions.iter().chain(mesh.velocities.iter());
+    let bounds = object.bounds();
+    let extent = [bounds.min, bounds.max, object.center()];
+    let vectors = mesh.positions.iter().chain(mesh.velocities.iter()).chain(extent);
     vectors.flat_map(|vector| vector.to_array().map(f32::to_bits)).collect()
 }
 

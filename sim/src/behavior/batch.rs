@@ -6,11 +6,11 @@ use std::any::Any;
 use std::cmp::Reverse;
 use std::sync::Arc;
 
-use super::abreast::{self, AdvanceAbreast, WIDEST, seat};
+use super::abreast::{self, AdvanceAbreast, Body, WIDEST, seat};
 use super::spring_kernel::{self, Advance, Springs};
 use super::workspace::SpringWork;
 use super::{Input, MassSpring};
-use crate::geometry::Mesh;
+use crate::geometry::{Extent, Mesh};
 use crate::object::{Object, ObjectId};
 use crate::simd::{HALF, Simd};
 
@@ -81,23 +81,29 @@ pub(crate) fn begin(object: &mut Object, place: usize, input: &mut Input<'_>) ->
     true
 }
 
-/// Advances the springs of all bodies that wait.
-pub(crate) fn advance(objects: &mut [Object], work: &mut SpringWork, simd: Simd) {
+/// Advances the springs of all bodies that wait to this frame, and brings up to date where these are.
+pub(crate) fn advance(objects: &mut [Object], work: &mut SpringWork, frame: u64, simd: Simd) {
     let SpringWork { waiting, alone, abreast } = work;
     for mut alike in waiting.chunk_by(|a, b| a.kind() == b.kind()) {
         while let [first, ..] = alike {
-            let Some(mesh) = objects[first.place].geometry.as_mesh_mut() else { break };
+            let object = &mut objects[first.place];
+            let Some(mesh) = object.geometry.as_mesh_mut() else { break };
             let is_small = mesh.topology().nodes() <= MOST_NODES / 2;
             let (count, lanes) = together(alike, if is_small { simd.width() } else { HALF });
             let (now, later) = alike.split_at(count);
             if now.len() > 1 {
-                advance_together(now, lanes, objects, abreast, simd);
+                let extents = advance_together(now, lanes, objects, abreast, simd);
+                for (body, extent) in now.iter().zip(extents) {
+                    objects[body.place].settle(frame, extent);
+                }
             } else {
                 advance_alone(mesh, first.springs, alone, simd);
+                object.refresh(frame, simd);
             }
             alike = later;
         }
     }
+    waiting.clear();
 }
 
 /// How many of the first bodies are best advanced together, and in how many lanes, of which there are at most
@@ -136,25 +142,29 @@ impl Filling {
     }
 }
 
+/// Says where each of them is then.
 fn advance_together(
     bodies: &[Waiting],
     lanes: usize,
     objects: &mut [Object],
     nodes: &mut abreast::Nodes,
     simd: Simd,
-) {
+) -> [Extent; 2 * WIDEST] {
+    let mut extents = [Extent::EMPTY; 2 * WIDEST];
     let mut objects = objects.iter_mut();
     let mut next = 0;
     let mut seated = [const { [const { None }; WIDEST] }; 2];
-    for (index, body) in bodies.iter().enumerate() {
+    for (index, (body, extent)) in bodies.iter().zip(&mut extents).enumerate() {
         let object = objects.nth(body.place - next);
         next = body.place + 1;
         if let Some(mesh) = object.and_then(|object| object.geometry.as_mesh_mut()) {
             let (turn, lane) = seat(index, lanes);
-            seated[turn][lane] = Some((mesh.kernel_parts(), body.springs));
+            let (parts, springs) = (mesh.kernel_parts(), body.springs);
+            seated[turn][lane] = Some(Body { parts, springs, extent });
         }
     }
     simd.run(AdvanceAbreast { bodies: seated, nodes });
+    extents
 }
 
 /// Advances the springs of one body.
@@ -167,4 +177,33 @@ pub(super) fn advance_alone(
     let parts = mesh.kernel_parts();
     let chunks = parts.topology.present().len();
     simd.for_look_up(chunks).run(Advance { parts, nodes, springs });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blocking::Grain;
+    use crate::executor::{Executor, SerialExecutor};
+    use crate::render::NullRenderer;
+    use crate::scene::ParticleScene;
+
+    #[test]
+    fn bodies_side_by_side_are_measured_as_one_by_itself() {
+        for simd in Simd::available() {
+            // With 100 some lanes have two, some blocks a body that is by itself.
+            for objects in [70, 100, 161] {
+                let mut scene = ParticleScene::new(objects).build().expect("a valid scene");
+                scene.stages.simd = simd;
+                let mut executor =
+                    SerialExecutor::new(scene, Grain::Spatial).expect("a valid scene");
+                let advanced = executor.advance(3, &mut NullRenderer::new(), &mut |_| ());
+                advanced.expect("nothing can be full");
+                executor.visit(&mut |object| {
+                    let (known, measured) =
+                        (object.interaction_extent(), object.geometry.extent(simd));
+                    assert_eq!(known, measured, "{:?} of {objects}", object.id());
+                });
+            }
+        }
+    }
 }

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::bounds::Bounds;
 use super::mesh::Mesh;
 use super::vectors::{LANES, Lanes};
-use crate::simd::{Isa, Kernel, first_lanes, greatest, least};
+use crate::simd::{Isa, Kernel, greatest, least};
 
 /// Where a geometry is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub struct Extent {
     /// The radius of a sphere around `center` that holds all of a surface, contact spheres included, in metres;
     /// infinite for what is no surface.
     pub radius: f32,
-    /// Whether every number in it that changes is finite, and the box, unless it is empty.
+    /// Whether every number in it that changes is finite, a surface's sums of them too, and the box, unless it is empty.
     pub finite: bool,
 }
 
@@ -62,6 +62,13 @@ impl Extent {
         Self { bounds, ..Self::EMPTY }
     }
 
+    /// The same around contact spheres of this radius, in metres, on nodes that it is around.
+    #[inline(always)]
+    pub(crate) fn with_contact_spheres(self, contact_radius: f32) -> Self {
+        let bounds = self.bounds.inflated(contact_radius);
+        Self { radius: self.radius + contact_radius, ..Self::new(bounds, self.center, self.finite) }
+    }
+
     /// Of a geometry whose numbers are finite or not. Finite numbers may still be too large for a box.
     pub(super) fn new(bounds: Bounds, center: Vec3, finite: bool) -> Self {
         let boxed = bounds.is_finite() || bounds == Bounds::EMPTY;
@@ -90,33 +97,31 @@ impl Kernel for Measure<'_> {
     fn run<I: Isa>(self, isa: I) -> Extent {
         let Self(mesh) = self;
         let nodes = mesh.positions.len();
-        let mut extent = Extent::new(Bounds::EMPTY, Vec3::ZERO, true);
-        // A number times zero is zero, an infinity or a NaN times zero is a NaN.
+        let mut extent = Extent::EMPTY;
         let nothing = isa.splat(0.0);
-        let mut zeros = nothing;
         let (positions, velocities) = (mesh.positions.components(), mesh.velocities.components());
         for axis in 0..3 {
             let mut low = isa.splat(f32::INFINITY);
             let mut high = isa.splat(f32::NEG_INFINITY);
-            let mut sum = nothing;
+            let (mut sum, mut velocity) = (nothing, nothing);
             for (chunk, lanes) in positions[axis].iter().enumerate() {
                 let values = isa.load(lanes);
                 let hidden = isa.load(hidden_after(nodes - chunk * LANES));
                 low = isa.min(isa.add(values, hidden), low);
                 high = isa.max(isa.sub(values, hidden), high);
                 sum = isa.add(sum, values);
-                zeros = isa.add(zeros, isa.mul(values, nothing));
             }
             for lanes in velocities[axis] {
-                zeros = isa.add(zeros, isa.mul(isa.load(lanes), nothing));
+                velocity = isa.add(velocity, isa.load(lanes));
             }
-            extent.bounds.min[axis] = least(isa, low) - mesh.contact_radius();
-            extent.bounds.max[axis] = greatest(isa, high) + mesh.contact_radius();
+            extent.bounds.min[axis] = least(isa, low);
+            extent.bounds.max[axis] = greatest(isa, high);
             extent.center[axis] = isa.sum(sum) / nodes.max(1) as f32;
+            // An infinity or a NaN makes any sum one.
+            extent.finite &= extent.center[axis].is_finite() && isa.sum(velocity).is_finite();
         }
-        extent.finite = isa.at_most(zeros, nothing) == first_lanes(LANES);
-        extent.radius = farthest(isa, positions, nodes, extent.center) + mesh.contact_radius();
-        extent
+        extent.radius = farthest(isa, positions, nodes, extent.center);
+        extent.with_contact_spheres(mesh.contact_radius())
     }
 }
 

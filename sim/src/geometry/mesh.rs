@@ -223,6 +223,7 @@ impl Mesh {
             velocities: self.velocities.lines_mut(),
             masses: &self.masses.masses,
             inverse_masses: &self.masses.inverse,
+            contact_radius: self.contact_radius,
         }
     }
 }
@@ -238,6 +239,8 @@ pub(crate) struct KernelParts<'a> {
     pub(crate) velocities: &'a mut [Line],
     pub(crate) masses: &'a [Lanes],
     pub(crate) inverse_masses: &'a [Lanes],
+    /// In metres.
+    pub(crate) contact_radius: f32,
 }
 
 #[cfg(test)]

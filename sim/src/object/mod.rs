@@ -5,6 +5,7 @@ mod fault;
 mod visual;
 
 use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use glam::Vec3;
@@ -168,10 +169,21 @@ impl Object {
 
     /// Fits box and centre to a geometry that was changed from outside, and takes the object for scenery or not by
     /// its behaviour. That is done where an executor takes over a scene; within an environment box and centre
-    /// are fitted after every update.
+    /// are fitted after every update. An object whose shape or behaviour panics then is nowhere, and its next update
+    /// excludes it; one that is excluded is left as it is.
     pub fn refit(&mut self) {
-        self.fixed = self.behavior.is_fixed();
-        self.fit(self.geometry.extent(Simd::detect()));
+        if self.quarantined.is_some() {
+            return;
+        }
+        let look = || (self.behavior.is_fixed(), self.geometry.extent(Simd::detect()));
+        match catch_unwind(AssertUnwindSafe(look)) {
+            Ok((fixed, extent)) => {
+                self.fixed = fixed;
+                self.fit(extent);
+            }
+            // The next update, in whose frame it is excluded, asks again.
+            Err(_) => self.fit(Extent { finite: false, ..Extent::EMPTY }),
+        }
     }
 
     fn fit(&mut self, extent: Extent) {
@@ -184,7 +196,11 @@ impl Object {
 
     /// Brings the box up to date, or excludes the object if its state is not finite.
     pub(crate) fn refresh(&mut self, frame: u64, simd: Simd) {
-        let extent = self.geometry.extent(simd);
+        self.settle(frame, self.geometry.extent(simd));
+    }
+
+    /// The same where its extent is known.
+    pub(crate) fn settle(&mut self, frame: u64, extent: Extent) {
         if extent.finite {
             self.fit(extent);
         } else {

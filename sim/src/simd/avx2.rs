@@ -180,6 +180,18 @@ impl Arithmetic for Avx2Half {
     }
 
     #[inline(always)]
+    fn min(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm256_min_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn max(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm256_max_ps(a, b) }
+    }
+
+    #[inline(always)]
     fn choose(self, chooser: __m256, a: __m256, b: __m256) -> __m256 {
         // SAFETY: as in `splat`.
         unsafe { _mm256_or_ps(_mm256_and_ps(chooser, a), _mm256_andnot_ps(chooser, b)) }
@@ -272,6 +284,16 @@ impl Arithmetic for Avx2 {
     }
 
     #[inline(always)]
+    fn min(self, a: Pair, b: Pair) -> Pair {
+        [self.0.min(a[0], b[0]), self.0.min(a[1], b[1])]
+    }
+
+    #[inline(always)]
+    fn max(self, a: Pair, b: Pair) -> Pair {
+        [self.0.max(a[0], b[0]), self.0.max(a[1], b[1])]
+    }
+
+    #[inline(always)]
     fn choose(self, chooser: Pair, a: Pair, b: Pair) -> Pair {
         [self.0.choose(chooser[0], a[0], b[0]), self.0.choose(chooser[1], a[1], b[1])]
     }
@@ -289,18 +311,6 @@ impl Isa for Avx2 {
     #[inline(always)]
     fn sum(self, vector: Pair) -> f32 {
         self.0.sum(self.0.add(vector[0], vector[1]))
-    }
-
-    #[inline(always)]
-    fn min(self, a: Pair, b: Pair) -> Pair {
-        // SAFETY: the machine has AVX2, or there were no `self`.
-        unsafe { [_mm256_min_ps(a[0], b[0]), _mm256_min_ps(a[1], b[1])] }
-    }
-
-    #[inline(always)]
-    fn max(self, a: Pair, b: Pair) -> Pair {
-        // SAFETY: the machine has AVX2, or there were no `self`.
-        unsafe { [_mm256_max_ps(a[0], b[0]), _mm256_max_ps(a[1], b[1])] }
     }
 
     #[inline(always)]

@@ -90,6 +90,18 @@ impl Arithmetic for Avx512 {
     }
 
     #[inline(always)]
+    fn min(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_min_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn max(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as in `splat`.
+        unsafe { _mm512_max_ps(a, b) }
+    }
+
+    #[inline(always)]
     fn choose(self, chooser: __m512, a: __m512, b: __m512) -> __m512 {
         /// For each bit that of the second operand where the first's is set, of the third elsewhere.
         const CHOICE: i32 = 0b1100_1010;
@@ -119,18 +131,6 @@ impl Isa for Avx512 {
             _mm256_add_ps(_mm512_castps512_ps256(vector), _mm256_castpd_ps(upper))
         };
         self.half().sum(half)
-    }
-
-    #[inline(always)]
-    fn min(self, a: __m512, b: __m512) -> __m512 {
-        // SAFETY: as in `splat`.
-        unsafe { _mm512_min_ps(a, b) }
-    }
-
-    #[inline(always)]
-    fn max(self, a: __m512, b: __m512) -> __m512 {
-        // SAFETY: as in `splat`.
-        unsafe { _mm512_max_ps(a, b) }
     }
 
     #[inline(always)]

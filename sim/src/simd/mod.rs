@@ -177,6 +177,10 @@ pub(crate) trait Arithmetic: Copy {
     fn mul(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
     fn div(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
     fn sqrt(self, a: Self::Vector) -> Self::Vector;
+    /// The lesser ones; `b` where one is a NaN.
+    fn min(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    /// The greater ones; `b` where one is a NaN.
+    fn max(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
 
     /// The bits of `a` where those of `chooser` are set, of `b` elsewhere.
     fn choose(self, chooser: Self::Vector, a: Self::Vector, b: Self::Vector) -> Self::Vector;
@@ -209,10 +213,6 @@ pub(crate) trait Isa: Arithmetic<Lanes = Lanes> {
     /// The sum over the lanes, as [`fold`] takes it.
     fn sum(self, vector: Self::Vector) -> f32;
 
-    /// The lesser ones; `b` where one is a NaN.
-    fn min(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
-    /// The greater ones; `b` where one is a NaN.
-    fn max(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
     /// The lanes in which `a` is less than `b`.
     fn less(self, a: Self::Vector, b: Self::Vector) -> LaneSet;
     /// The lanes in which `a` is at most `b`.

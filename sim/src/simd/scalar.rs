@@ -73,6 +73,16 @@ impl<const N: usize> Arithmetic for Plain<N> {
     }
 
     #[inline(always)]
+    fn min(self, a: [f32; N], b: [f32; N]) -> [f32; N] {
+        each(a, b, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn max(self, a: [f32; N], b: [f32; N]) -> [f32; N] {
+        each(a, b, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
     fn choose(self, chooser: [f32; N], a: [f32; N], b: [f32; N]) -> [f32; N] {
         let mut chosen = b;
         for lane in 0..N {
@@ -108,16 +118,6 @@ impl Isa for Scalar {
     #[inline(always)]
     fn sum(self, vector: Lanes) -> f32 {
         fold(vector)
-    }
-
-    #[inline(always)]
-    fn min(self, a: Lanes, b: Lanes) -> Lanes {
-        each(a, b, |a, b| if a < b { a } else { b })
-    }
-
-    #[inline(always)]
-    fn max(self, a: Lanes, b: Lanes) -> Lanes {
-        each(a, b, |a, b| if a > b { a } else { b })
     }
 
     #[inline(always)]

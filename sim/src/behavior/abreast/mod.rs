@@ -6,14 +6,15 @@
 //!
 //! [`spring_kernel`]: super::spring_kernel
 
+mod measure;
 mod nodes;
 
 use std::hint::black_box;
 use std::ptr;
 
-use self::nodes::{
-    Body, Columns, Force, Motion, Node, Set, Weight, exchange, gather, scatter, weigh,
-};
+use self::measure::measure;
+pub(super) use self::nodes::Body;
+use self::nodes::{Columns, Force, Motion, Node, Set, Weight, exchange, gather, scatter, weigh};
 use super::spring_kernel::Springs;
 use super::spring_law::{Dashpot, Elastic, Law, load, minus, plus, store, times};
 use crate::geometry::{KernelParts, LANES, Lanes, Spring, Topology};
@@ -74,10 +75,12 @@ fn advance_all<A: Arithmetic<Lanes: Columns>, H: HalfIsa>(
     [first, second]: &mut [[Option<Body<'_>>; WIDEST]; 2],
     set: &mut Set<A::Lanes>,
 ) {
-    let Some((any @ KernelParts { topology, .. }, springs)) = &first[0] else { return };
+    let Some(Body { parts: any @ KernelParts { topology, .. }, springs, .. }) = &first[0] else {
+        return;
+    };
     let (topology, idle) = (*topology, Seat { springs: *springs, left: 0 });
     let mut bodies = first.iter().chain(&*second).flatten();
-    let alike = bodies.all(|(body, _)| ptr::eq(body.masses, any.masses));
+    let alike = bodies.all(|body| ptr::eq(body.parts.masses, any.masses));
     set.reserve(topology.nodes());
     let len = topology.present().len() * LANES;
     let Set { nodes: [now, next], weights: [weights, next_weights], forces } = set;
@@ -120,8 +123,12 @@ fn advance_all<A: Arithmetic<Lanes: Columns>, H: HalfIsa>(
             std::mem::swap(first, second);
         }
     }
-    scatter(half, now, first);
-    scatter(half, next, second);
+    for (nodes, bodies) in [(&*now, first), (&*next, second)] {
+        if bodies.iter().any(Option::is_some) {
+            measure(isa, &nodes[..topology.nodes()], bodies);
+            scatter(half, nodes, bodies);
+        }
+    }
 }
 
 /// What a lane computes with.
@@ -162,7 +169,7 @@ fn begin<A: Arithmetic<Lanes: Columns>, H: HalfIsa>(
 ) -> [Seat; WIDEST] {
     let mut seats = [idle; WIDEST];
     for (seat, body) in seats.iter_mut().zip(bodies) {
-        if let Some((_, springs)) = body {
+        if let Some(Body { springs, .. }) = body {
             *seat = Seat { springs: *springs, left: springs.substeps };
         }
     }

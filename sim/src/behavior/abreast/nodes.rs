@@ -5,7 +5,7 @@ use std::slice;
 
 use super::super::spring_kernel::Springs;
 use super::WIDEST;
-use crate::geometry::{KernelParts, LANES, Lanes, component, component_mut};
+use crate::geometry::{Extent, KernelParts, LANES, Lanes, component, component_mut};
 use crate::simd::{Arithmetic, HALF, HalfIsa, HalfLanes};
 
 /// One number of each body.
@@ -17,6 +17,8 @@ pub(in super::super) trait Columns: Copy + Debug + Default {
 
     /// `number` of each lane.
     fn each(number: impl Fn(usize) -> f32) -> Self;
+    /// That of one lane.
+    fn at(&self, lane: usize) -> f32;
     fn halves(&self) -> &[HalfLanes];
     fn halves_mut(&mut self) -> &mut [HalfLanes];
 }
@@ -36,6 +38,11 @@ impl Columns for HalfLanes {
             *own = number(lane);
         }
         lanes
+    }
+
+    #[inline(always)]
+    fn at(&self, lane: usize) -> f32 {
+        self[lane]
     }
 
     #[inline(always)]
@@ -64,6 +71,11 @@ impl Columns for Lanes {
             *own = number(lane);
         }
         lanes
+    }
+
+    #[inline(always)]
+    fn at(&self, lane: usize) -> f32 {
+        self[lane]
     }
 
     #[inline(always)]
@@ -173,7 +185,12 @@ impl<C: Columns> Set<C> {
 pub(super) type Motion<'n, C> = (&'n mut [Node<C>], &'n [Weight<C>], &'n mut [Force<C>]);
 
 /// A body with its numbers.
-pub(in super::super) type Body<'a> = (KernelParts<'a>, Springs);
+pub(in super::super) struct Body<'a> {
+    pub(in super::super) parts: KernelParts<'a>,
+    pub(in super::super) springs: Springs,
+    /// Set to where it is in the end.
+    pub(in super::super) extent: &'a mut Extent,
+}
 
 /// Exchanges the bodies of the lanes in which all bits are set.
 #[inline(always)]
@@ -200,7 +217,7 @@ pub(super) fn gather<H: HalfIsa, C: Columns, R: Rows<C>>(
     bodies: &[Option<Body<'_>>; WIDEST],
     nodes: &mut [R],
 ) {
-    let Some((any, _)) = bodies.iter().flatten().next() else { return };
+    let Some(Body { parts: any, .. }) = bodies.iter().flatten().next() else { return };
     let ((bodies, _), (nodes, _)) = (bodies.as_chunks::<HALF>(), nodes.as_chunks_mut::<HALF>());
     let chunks = nodes.len();
     for row in 0..R::COUNT {
@@ -208,7 +225,7 @@ pub(super) fn gather<H: HalfIsa, C: Columns, R: Rows<C>>(
             // Looked up and cut to their length here: in the loop below that took as long as the rest.
             let values = bodies.each_ref().map(|body| {
                 // Lanes without a body repeat one.
-                let body = body.as_ref().map_or(any, |(body, _)| body);
+                let body = body.as_ref().map_or(any, |body| &body.parts);
                 let (values, _) = R::of(body, row).as_flattened().as_chunks();
                 &values[..chunks]
             });
@@ -254,7 +271,7 @@ pub(super) fn scatter<H: HalfIsa, C: Columns>(
     for row in 0..Node::<C>::COUNT {
         for (half, bodies) in bodies[..C::COUNT / HALF].iter_mut().enumerate() {
             let values = bodies.each_mut().map(|body| match body {
-                Some((KernelParts { positions, velocities, .. }, _)) => {
+                Some(Body { parts: KernelParts { positions, velocities, .. }, .. }) => {
                     let vectors = if row < 3 { positions } else { velocities };
                     let values = component_mut(vectors, row % 3).as_flattened_mut();
                     &mut values.as_chunks_mut().0[..chunks]
