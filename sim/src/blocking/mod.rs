@@ -154,7 +154,7 @@ impl Blocking {
         };
         let share = if moving_blocks == moving.len() { 1 } else { HALF };
         // How many each block has changes.
-        let room = UNEVENNESS * moving.len().div_ceil(share).div_ceil(moving_blocks.max(1)) * share;
+        let room = most_shares(moving.len(), share, moving_blocks) * share;
         let mut members = Vec::new();
         members.resize_with(moving_blocks, || Members::of(Vec::with_capacity(room)));
         let mut keys: Vec<Key> = moving.iter().map(|&id| Key::of(&objects[id as usize])).collect();
@@ -213,7 +213,8 @@ impl Blocking {
             members.home = place as u32 % homes;
         }
         let members = &mut self.members[..self.moving_blocks];
-        split::among_homes(&mut self.keys, members, 0..homes, self.share, besides);
+        let most = most_shares(self.keys.len(), self.share, members.len());
+        split::among_homes(&mut self.keys, members, 0..homes, self.share, most, besides);
         number(members);
         members.sort_unstable_by_key(Members::order);
         self.regroup(blocks);
@@ -270,6 +271,11 @@ impl Blocking {
             *part = members.part;
         }
     }
+}
+
+/// How many shares one of so many blocks may come to have.
+fn most_shares(objects: usize, share: usize, blocks: usize) -> usize {
+    UNEVENNESS * objects.div_ceil(share).div_ceil(blocks.max(1))
 }
 
 /// Numbers the parts of space that blocks were given.

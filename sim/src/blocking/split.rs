@@ -52,12 +52,14 @@ impl Key {
 
 /// Shares objects and blocks out to homes that are to take equally long: parts along the longest side until each is
 /// one home's, which has blocks in proportion to its objects. Who works at the first of all homes does something else
-/// for `besides` seconds a frame. While no costs are known, each gets as many.
+/// for `besides` seconds a frame. While no costs are known, each gets as many. However uneven homes are, no block has
+/// more than `most` shares, which is enough for all.
 pub(super) fn among_homes(
     keys: &mut [Key],
     members: &mut [Members],
     homes: Range<u32>,
     share: usize,
+    most: usize,
     besides: f32,
 ) {
     let shares = keys.len().div_ceil(share);
@@ -74,15 +76,18 @@ pub(super) fn among_homes(
     } else {
         part * shares as f32
     };
-    // However uneven homes are, no block is to become very large.
+    // Nor is any to become very small.
     let least = 0.5 * shares as f32 / members.len() as f32;
     let wanted = wanted.clamp(least, shares as f32 - least).round() as usize;
     let low_shares = wanted.clamp(1, shares - 1);
     let blocks = (members.len() * low_shares + shares / 2) / shares;
+    let blocks = blocks.clamp(1, members.len() - 1);
+    let high_most = most * (members.len() - blocks);
+    let low_shares = low_shares.clamp(shares.saturating_sub(high_most), most * blocks);
     let (low, high) = part_at(keys, low_shares * share, axis);
-    let (low_members, high_members) = members.split_at_mut(blocks.clamp(1, members.len() - 1));
-    among_homes(low, low_members, homes.start..half, share, besides);
-    among_homes(high, high_members, half..homes.end, share, 0.0);
+    let (low_members, high_members) = members.split_at_mut(blocks);
+    among_homes(low, low_members, homes.start..half, share, most, besides);
+    among_homes(high, high_members, half..homes.end, share, most, 0.0);
 }
 
 /// How many objects come first along an axis, and as keys then, before they cost so much.

@@ -219,6 +219,32 @@ fn who_has_no_time_left_is_given_little() {
     assert_eq!(cost(&given[0]), 40, "{given:?}");
 }
 
+/// Where part after part has the cheaper half, that of one block grows from split to split.
+#[test]
+fn no_block_outgrows_its_room_however_uneven_costs_are() {
+    const OBJECTS: usize = 1_024;
+    const HOMES: u32 = 16;
+    let most = most_shares(OBJECTS, HALF, HOMES as usize);
+    for cheap in (HALF..OBJECTS).step_by(HALF) {
+        for cost in [0.1, 0.4, 0.8] {
+            let key = |id: usize| {
+                let cost = if id < cheap { cost } else { 1.0 };
+                Key::new((ObjectId(id as u32), Vec3::X * id as f32, cost))
+            };
+            let mut keys: Vec<Key> = (0..OBJECTS).map(key).collect();
+            let mut members: Vec<Members> = (0..HOMES).map(|_| Members::of(Vec::new())).collect();
+            split::among_homes(&mut keys, &mut members, 0..HOMES, HALF, most, 0.0);
+            let sizes = members.iter().map(|members| members.ids.len());
+            assert_eq!(sizes.clone().sum::<usize>(), OBJECTS);
+            assert!(
+                sizes.clone().all(|size| size <= most * HALF),
+                "{cheap} at {cost}: {:?}",
+                sizes.collect::<Vec<_>>()
+            );
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]

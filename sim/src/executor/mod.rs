@@ -177,7 +177,7 @@ pub trait Executor: Send {
     /// pool before this returns, and must hold nothing that they wait for.
     ///
     /// # Errors
-    /// More than 512 blocks, of which more than 63 threads are the usual cause, crowd so fast that the pipeline's
+    /// More than 512 blocks, of which more than 128 threads are the usual cause, crowd so fast that the pipeline's
     /// table of blocks that meet, which grows every
     /// [`FRAMES_PER_BLOCKING`](crate::blocking::FRAMES_PER_BLOCKING) frames, is full. The environment cannot go
     /// on then: a frame without some of its interactions would not be the same for every schedule. Or the

@@ -1,7 +1,7 @@
 //! What a response found for one object of a pair, summed up node by node.
 
 use super::Member;
-use super::contact::{ContactRecord, Segment};
+use super::contact::{Contact, ContactRecord, Segment};
 
 /// The impulses on one object of a pair: one sum per touched node.
 #[derive(Debug)]
@@ -20,13 +20,15 @@ impl Default for Impulses {
 
 impl Impulses {
     /// Adds an impulse, in newton seconds, to a node's sum, or for [`Contact::BODY`] to the whole
-    /// body's.
-    ///
-    /// [`Contact::BODY`]: super::Contact::BODY
+    /// body's. Of [`Contact::FAULT`], which is no node, nothing comes.
     #[inline]
     pub fn add(&mut self, node: u32, impulse: [f32; 3]) {
         if let Some(sum) = self.find(node) {
             sum.add(impulse);
+            return;
+        }
+        // Only a panic is to be taken for one.
+        if node == Contact::FAULT {
             return;
         }
         let new = self.records.len() as u32;
