@@ -1,5 +1,8 @@
 //! What is saved is whole, or what was there is.
 
+#[cfg(unix)]
+use std::{fs, path::Path, process::Command};
+
 use dualframe_sim::image::{Grid, Image, save};
 use glam::{DAffine3, DVec3};
 
@@ -26,23 +29,52 @@ fn saved() {
     assert_eq!(Image::open(&path).expect("it was just written"), image);
 }
 
-/// Where no file may be longer than a few kilobytes, as on a full disk, the image that was there stays; run by
-/// [`a_full_disk_keeps_what_was_there`].
+/// Zeros, 256 KiB of them.
 #[cfg(unix)]
-#[test]
-#[ignore = "run by another test, within limits"]
-fn saves_on_a_full_disk() {
-    let path = std::env::var_os("DUALFRAME_TEST_IMAGE").expect("the other test says where");
+fn zeros() -> Image {
     let grid = Grid::new([64; 3], DAffine3::from_scale(DVec3::splat(1e-3))).expect("allowed");
-    let voxels = vec![0_u8; grid.voxels()];
-    let error = save(path.as_ref(), &grid, &voxels).expect_err("there is no room for it");
-    assert!(error.to_string().contains("too large"), "{error}");
+    let voxels = vec![0; grid.voxels()];
+    Image::new(grid, voxels).expect("one for each")
 }
 
+/// Saves [`zeros`] as bytes and prints how that went, for the tests that run it within limits.
+#[cfg(unix)]
+#[test]
+#[ignore = "run by other tests, within limits"]
+fn saves_and_tells() {
+    let path = std::env::var_os("DUALFRAME_TEST_IMAGE").expect("the other test says where");
+    let image = zeros();
+    match save(path.as_ref(), image.grid(), &vec![0_u8; image.voxels().len()]) {
+        Ok(()) => println!("it is saved"),
+        Err(error) => println!("{error}"),
+    }
+}
+
+/// What [`saves_and_tells`] prints of a path if it is run by a command.
+#[cfg(unix)]
+fn told(command: &[&str], path: &Path) -> String {
+    let child = Command::new(command[0])
+        .args(&command[1..])
+        .arg(std::env::current_exe().expect("this one"))
+        .args(["--ignored", "--exact", "--nocapture", "saves::saves_and_tells"])
+        .env("DUALFRAME_TEST_IMAGE", path)
+        .output()
+        .expect("there is such a command");
+    let told = String::from_utf8_lossy(&child.stdout);
+    assert!(child.status.success() && told.contains("1 passed"), "{told}");
+    told.into_owned()
+}
+
+/// Whether there is such a command, and it may do what it is asked for.
+#[cfg(target_os = "linux")]
+fn can(command: &[&str]) -> bool {
+    Command::new(command[0]).args(&command[1..]).output().is_ok_and(|child| child.status.success())
+}
+
+/// Where no file may be longer than a few kilobytes, as on a full disk, the image that was there stays.
 #[cfg(unix)]
 #[test]
 fn a_full_disk_keeps_what_was_there() {
-    use std::fs;
     use std::os::unix::fs::{PermissionsExt, symlink};
 
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -51,15 +83,8 @@ fn a_full_disk_keeps_what_was_there() {
     save(&path, image.grid(), image.voxels()).expect("the folder takes it");
     symlink("volume.nii", &link).expect("the folder takes it");
     fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).expect("it is ours");
-    let test = std::env::current_exe().expect("this one");
-    let script = "trap '' XFSZ; ulimit -f 8; exec \"$0\" --ignored --exact saves::saves_on_a_full_disk";
-    let child = std::process::Command::new("sh")
-        .args(["-c".as_ref(), script.as_ref(), test.as_os_str()])
-        .env("DUALFRAME_TEST_IMAGE", &link)
-        .output()
-        .expect("there is a shell");
-    let said = String::from_utf8_lossy(&child.stdout);
-    assert!(child.status.success() && said.contains("1 passed"), "{said}");
+    let told = told(&["sh", "-c", "trap '' XFSZ; ulimit -f 8; exec \"$0\" \"$@\""], &link);
+    assert!(told.contains("too large"), "{told}");
     assert_eq!(Image::open(&path).expect("it is whole"), image);
     assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 2, "something is left");
 
@@ -69,9 +94,74 @@ fn a_full_disk_keeps_what_was_there() {
     assert!(fs::symlink_metadata(&link).expect("it is there").is_symlink());
     let mode = fs::metadata(&path).expect("it is there").permissions().mode();
     assert_eq!(mode & 0o777, 0o600, "others may read it");
-    if std::path::Path::new("/dev/full").exists() {
+    if Path::new("/dev/full").exists() {
         save("/dev/full".as_ref(), image.grid(), &changed).expect_err("it is full");
     }
+}
+
+/// As on a disk that knows no permissions, where these are not ours to change.
+#[cfg(target_os = "linux")]
+#[test]
+fn permissions_that_cannot_be_given_are_not() {
+    let command = ["strace", "-f", "-o", "/dev/null", "-e", "inject=fchmod:error=EPERM"];
+    if !can(&[&command[..], &["true"]].concat()) {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("volume.nii");
+    fs::write(&path, "another").expect("the folder takes it");
+    let told = told(&command, &path);
+    assert!(told.contains("it is saved"), "{told}");
+    assert_eq!(Image::open(&path).expect("it is whole"), zeros());
+    assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1, "something is left");
+}
+
+/// A program that runs may not be written, by root neither.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_that_may_not_be_written_stays() {
+    let test = std::env::current_exe().expect("this one");
+    let folder = tempfile::tempdir_in(test.parent().expect("a folder")).expect("it takes one");
+    let path = folder.path().join("volume.nii");
+    fs::hard_link(test, &path).expect("the folder takes it");
+    let image = read(&Nifti::small().bytes());
+    let error = save(&path, image.grid(), image.voxels()).expect_err("it runs");
+    assert!(error.to_string().contains("Text file busy"), "{error}");
+    assert!(Image::open(&path).is_err(), "it is an image");
+    assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1, "something is left");
+}
+
+/// A file that is mounted alone, whose place nothing takes: on a disk with room, and on one without.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_cannot_be_moved_is_whole_beside() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [path, there] = ["volume.nii", "there.nii"].map(|name| folder.path().join(name));
+    let mounts = ["unshare", "--map-root-user", "--mount", "sh", "-c"];
+    let place = folder.path().to_str().expect("it is text");
+    if !can(&[&mounts[..], &["mount -t tmpfs none \"$0\"", place]].concat()) {
+        return;
+    }
+    for file in [&path, &there] {
+        fs::write(file, "another").expect("the folder takes it");
+    }
+    let mounted = |script: &str| {
+        let script =
+            format!("cd \"${{DUALFRAME_TEST_IMAGE%/*}}\" && {script} && exec \"$0\" \"$@\"");
+        told(&[&mounts[..], &[&script]].concat(), &path)
+    };
+    let told = mounted("mount --bind there.nii volume.nii");
+    assert!(told.contains("it is saved"), "{told}");
+    assert_eq!(Image::open(&there).expect("it is whole"), zeros());
+    assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 2, "something is left");
+
+    let small = "mkdir small && mount -t tmpfs -o size=16k none small && touch small/there.nii";
+    let told = mounted(&format!("{small} && mount --bind small/there.nii volume.nii"));
+    assert!(told.contains("No space left on device"), "{told}");
+    let beside =
+        told.split("what was to be there is in ").nth(1).and_then(|rest| rest.lines().next());
+    let beside = beside.expect("it says where it is");
+    assert_eq!(Image::open(beside.as_ref()).expect("it is whole"), zeros());
 }
 
 #[cfg(unix)]
