@@ -146,6 +146,15 @@ fn same<V: Voxel + Into<i32>>(grid: &Grid, values: &[V]) {
     assert_eq!(again, file);
 }
 
+/// As other readers have it.
+#[test]
+fn without_a_slope_numbers_are_what_they_are() {
+    for scl in [[0.0, 5.0], [f32::NAN, 0.0], [f32::NAN; 2], [f32::INFINITY, 5.0]] {
+        let file = Nifti { scl, ..Nifti::small() };
+        assert_eq!(read(&file.bytes()), read(&Nifti::small().bytes()), "{scl:?}");
+    }
+}
+
 /// The standard's method 3 before method 2 before method 1.
 #[test]
 fn sform_before_qform_before_distances() {
