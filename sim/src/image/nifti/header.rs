@@ -58,6 +58,12 @@ impl Header {
     }
 }
 
+/// Whether a file that begins so may be NIfTI: its first entry is the header's length, in either order of bytes.
+pub(super) fn begins(start: &[u8]) -> bool {
+    let lengths = [SIZEOF_HDR, NIFTI_2];
+    lengths.iter().any(|length| start == length.to_le_bytes() || start == length.to_be_bytes())
+}
+
 struct Entries<'a> {
     bytes: &'a [u8; Header::BYTES],
     endian: Endian,
