@@ -366,14 +366,19 @@ fn turn(pose: &Pose, vector: Vec3, sense: f32) -> Vec3 {
 }
 
 fn check(dims: [u32; 3], spacing: Vec3) -> Result<(), VolumeError> {
+    check_dims(dims)?;
+    if !(spacing.is_finite() && spacing.cmpgt(Vec3::ZERO).all()) {
+        return Err(VolumeError::Spacing { spacing: spacing.to_array() });
+    }
+    Ok(())
+}
+
+fn check_dims(dims: [u32; 3]) -> Result<(), VolumeError> {
     if dims.iter().any(|dim| !(1..=Volume::MAX_SIDE).contains(dim)) {
         return Err(VolumeError::Side { dims });
     }
     if dims.iter().map(|&dim| u64::from(dim)).product::<u64>() > Volume::MAX_VOXELS {
         return Err(VolumeError::Voxels { dims });
-    }
-    if !(spacing.is_finite() && spacing.cmpgt(Vec3::ZERO).all()) {
-        return Err(VolumeError::Spacing { spacing: spacing.to_array() });
     }
     Ok(())
 }
