@@ -82,7 +82,8 @@ pub struct Volume {
 impl Volume {
     /// The most voxels along an axis: what every graphics device of the usual limits can hold.
     pub const MAX_SIDE: u32 = 2048;
-    /// The most voxels in all, so that no file's header can ask for more than 1 GiB.
+    /// The most voxels in all, so that no file's header can ask for much more than 1 GiB: 1.07 where sides
+    /// are rounded up to whole bricks.
     pub const MAX_VOXELS: u64 = 1 << 30;
 
     /// A volume that does not move.
