@@ -36,6 +36,9 @@ const FACES: [[u32; 3]; 20] = [
 /// The nodes (metres, around the origin, all `radius` metres from it) and the triangles of a
 /// once-subdivided icosahedron. Built by sums, products, divisions and square roots only, so that it
 /// has the same bits on every machine.
+///
+/// `radius` is to be from 1e-18 to 1e18 m; usually 0.1 m. Of others the squares are too small or too large, and places
+/// may be no numbers.
 #[must_use]
 pub fn icosphere(radius: f32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let mut nodes: Vec<Vec3> = corners().into_iter().map(|p| on_sphere(p, radius)).collect();
@@ -93,6 +96,14 @@ mod tests {
         assert_eq!(triangles.len(), ICOSPHERE_FACES);
         assert_eq!(edges(&triangles).len(), ICOSPHERE_EDGES);
         assert!(nodes.iter().all(|node| (node.length() - 0.1).abs() < 1e-7));
+    }
+
+    #[test]
+    fn the_smallest_and_the_largest() {
+        for radius in [1e-18, 1e18] {
+            let (nodes, _) = icosphere(radius);
+            assert!(nodes.iter().all(|node| (node.length() / radius - 1.0).abs() < 1e-6));
+        }
     }
 
     #[test]

@@ -195,7 +195,7 @@ impl Mesh {
         [&self.positions, &self.velocities].iter().all(|list| list.len() == self.topology.nodes())
     }
 
-    /// Becomes a copy of another mesh without giving up memory.
+    /// Becomes a copy of another mesh; gives up no memory of positions and velocities unless topologies differ.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         if !Arc::ptr_eq(&self.topology, &other.topology) {
             self.clone_from(other);

@@ -23,6 +23,14 @@ pub enum ImageError {
     /// The system does not read or write it.
     #[error(transparent)]
     Io(#[from] io::Error),
+    /// What was to take its place, and is whole, cannot be moved there.
+    #[error("{source}; what was to be there is in {}", beside.display())]
+    Beside {
+        /// Where it is.
+        beside: PathBuf,
+        /// Why it cannot be moved.
+        source: io::Error,
+    },
     /// It is a folder, a device or a pipe.
     #[error("not a file")]
     NotAFile,

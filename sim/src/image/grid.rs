@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::error::ImageError;
+use crate::geometry::Volume;
 
 /// The places of an image's voxels.
 ///
@@ -33,10 +34,10 @@ struct Axis {
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
 impl Grid {
-    /// The most voxels along an axis.
-    pub const MAX_SIDE: u32 = 2048;
-    /// The most voxels in all.
-    pub const MAX_VOXELS: u64 = 1 << 30;
+    /// The most voxels along an axis: as of a [`Volume`], which an image's bone can be.
+    pub const MAX_SIDE: u32 = Volume::MAX_SIDE;
+    /// The most voxels in all; as of a [`Volume`].
+    pub const MAX_VOXELS: u64 = Volume::MAX_VOXELS;
     /// The distances between voxels that can be, in metres.
     pub const SPACINGS: RangeInclusive<f64> = 1e-6..=0.1;
     /// How far the origin may be away, in metres along each axis.

@@ -5,3 +5,4 @@
 mod faults;
 mod files;
 mod round_trips;
+mod saves;

@@ -82,7 +82,8 @@ pub struct Volume {
 impl Volume {
     /// The most voxels along an axis: what every graphics device of the usual limits can hold.
     pub const MAX_SIDE: u32 = 2048;
-    /// The most voxels in all, so that no file's header can ask for more than 1 GiB.
+    /// The most voxels in all, so that no file's header can ask for much more than 1 GiB: 1.07 where sides
+    /// are rounded up to whole bricks.
     pub const MAX_VOXELS: u64 = 1 << 30;
 
     /// A volume that does not move.
@@ -366,14 +367,19 @@ fn turn(pose: &Pose, vector: Vec3, sense: f32) -> Vec3 {
 }
 
 fn check(dims: [u32; 3], spacing: Vec3) -> Result<(), VolumeError> {
+    check_dims(dims)?;
+    if !(spacing.is_finite() && spacing.cmpgt(Vec3::ZERO).all()) {
+        return Err(VolumeError::Spacing { spacing: spacing.to_array() });
+    }
+    Ok(())
+}
+
+fn check_dims(dims: [u32; 3]) -> Result<(), VolumeError> {
     if dims.iter().any(|dim| !(1..=Volume::MAX_SIDE).contains(dim)) {
         return Err(VolumeError::Side { dims });
     }
     if dims.iter().map(|&dim| u64::from(dim)).product::<u64>() > Volume::MAX_VOXELS {
         return Err(VolumeError::Voxels { dims });
-    }
-    if !(spacing.is_finite() && spacing.cmpgt(Vec3::ZERO).all()) {
-        return Err(VolumeError::Spacing { spacing: spacing.to_array() });
     }
     Ok(())
 }

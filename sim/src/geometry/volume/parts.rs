@@ -43,8 +43,8 @@ impl Part {
         self.bounds.clone()
     }
 
-    /// Whether it reaches to a side of the box that was searched, so that it may go on beyond. A part
-    /// that does not is free.
+    /// Whether it reaches to a side of the box that was searched, so that it may go on beyond; a side of
+    /// the grid is one, where the box went on outside of it. A part that does not is free.
     #[must_use]
     pub fn touches_border(&self) -> bool {
         self.touches_border

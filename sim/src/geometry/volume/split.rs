@@ -7,7 +7,7 @@ use parry3d::math::Pose;
 
 use super::bricks::{Bricks, Layout};
 use super::parts::{NOWHERE, Part};
-use super::{Volume, VolumeError};
+use super::{Volume, VolumeError, check_dims};
 
 /// How far around a part's box, in voxels, its rim and what else claims it are looked for; usually 16: more
 /// than twice the width of a surface, and of a pore of the diploe at 0.5 mm.
@@ -34,6 +34,9 @@ impl Volume {
     ///
     /// The part must have been found in this volume. What was drilled of it since is missing.
     ///
+    /// Until it is taken out that takes, beside the new volume, 2 bytes of memory for each voxel of the part's
+    /// box and of 16 around it on each side, and 4 to 8 for each of these that is not empty.
+    ///
     /// # Errors
     /// [`VolumeError::NoSuchPart`] for a part of another volume that reaches beyond this one's grid.
     pub fn split_off(&mut self, part: &Part) -> Result<Self, VolumeError> {
@@ -44,8 +47,7 @@ impl Volume {
         let claim = Claim::new(self, part);
         let owned = |voxel: [u32; 3]| claim.owner(voxel) == Owner::Part;
         let bounds = claim.bounds();
-        // An empty voxel around it, so that its surface lies within its grid.
-        let margin = u32::from(bounds.iter().all(|range| range.len() as u32 + 2 <= Self::MAX_SIDE));
+        let margin = margin(bounds.each_ref().map(|range| range.len() as u32));
         let dims = bounds.clone().map(|range| range.len() as u32 + 2 * margin);
         let first = bounds.clone().map(|range| range.start as i32 - margin as i32);
         let bricks = Bricks::from_fn(Layout { dims }, |voxel| {
@@ -59,6 +61,12 @@ impl Volume {
         self.bricks.lower(&bounds, |voxel, density| if owned(voxel) { density } else { 0 });
         Ok(Self { bricks, spacing: self.spacing, pose, velocity: self.velocity, margin: 0.0 })
     }
+}
+
+/// The empty voxels to leave around a piece of such sides, so that its surface lies within its grid: none where that
+/// would be more than a volume may have.
+fn margin(sides: [u32; 3]) -> u32 {
+    u32::from(check_dims(sides.map(|side| side + 2)).is_ok())
 }
 
 /// Whose the voxels around a part are. Around the region there is a layer of empty voxels, so that every
@@ -167,5 +175,24 @@ impl Claim {
             }
         }
         bounds
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::margin;
+
+    #[test]
+    fn a_piece_with_its_margin_is_a_volume() {
+        for (sides, expected) in [
+            ([1; 3], 1),
+            ([2046, 1, 1], 1),
+            ([2047, 1, 1], 0),
+            ([1022; 3], 1),
+            ([1023; 3], 0),
+            ([1024; 3], 0),
+        ] {
+            assert_eq!(margin(sides), expected, "{sides:?}");
+        }
     }
 }

@@ -58,6 +58,12 @@ impl Header {
     }
 }
 
+/// Whether a file that begins so may be NIfTI: its first entry is the header's length, in either order of bytes.
+pub(super) fn begins(start: &[u8]) -> bool {
+    let lengths = [SIZEOF_HDR, NIFTI_2];
+    lengths.iter().any(|length| start == length.to_le_bytes() || start == length.to_be_bytes())
+}
+
 struct Entries<'a> {
     bytes: &'a [u8; Header::BYTES],
     endian: Endian,
@@ -142,16 +148,15 @@ impl<'a> Entries<'a> {
         Ok(number)
     }
 
-    /// Slope and intercept; a slope of 0 means that numbers are what they are.
+    /// Slope and intercept; a slope of 0 means that numbers are what they are, and so does, to other readers
+    /// (nifticlib, nibabel), one that is not finite.
     fn scale(&self) -> Result<(f64, f64), ImageError> {
         let (slope, intercept) = (self.float(at::SCL_SLOPE), self.float(at::SCL_INTER));
-        if slope == 0.0 {
+        if slope == 0.0 || !slope.is_finite() {
             return Ok((1.0, 0.0));
         }
-        for (name, value) in [("scl_slope", slope), ("scl_inter", intercept)] {
-            if !value.is_finite() {
-                return Err(ImageError::field(name, value.to_string(), "finite"));
-            }
+        if !intercept.is_finite() {
+            return Err(ImageError::field("scl_inter", intercept.to_string(), "finite"));
         }
         Ok((slope.into(), intercept.into()))
     }

@@ -18,7 +18,13 @@ pub use write::{Voxel, save, write};
 pub(super) fn read(mut stream: Stream<'_>) -> Result<Image, ImageError> {
     let mut bytes = [0; Header::BYTES];
     let part = Part { name: "header", bytes: Header::BYTES as u64 };
-    stream.read(&mut bytes, part)?;
+    let (start, rest) = bytes.split_at_mut(size_of::<i32>());
+    stream.read(start, part)?;
+    // What is short need not be cut off.
+    if !header::begins(start) {
+        return Err(ImageError::Magic);
+    }
+    stream.read(rest, part)?;
     let header = Header::new(&bytes)?;
     stream.skip(header.gap, Part { bytes: part.bytes + header.gap, ..part })?;
     Image::decode(header.grid, &header.samples, &mut stream)

@@ -1,6 +1,6 @@
 //! Volumes out.
 
-use std::fs::{self, File};
+use std::fs::{self, File, Metadata};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process;
@@ -44,67 +44,78 @@ voxel!(u16, 512);
 /// Writes a volume to a file, packed by gzip if its name ends in `.gz`; as [`write()`].
 ///
 /// It is written beside the file and takes its place when it is whole, so that a full disk leaves what was there. Where
-/// nothing can be put beside it (the folder is another's, the name is too long for more), and where it is a device, a
-/// pipe or a link to a file that is not there yet, it is written as it is.
+/// nothing can be put beside it (the folder is another's, the name is too long for more, the disk knows no such
+/// permissions), and where it is a device, a pipe or a link to a file that is not there yet, it is written as it is. A
+/// file that may not be written stays as it is.
 ///
 /// # Errors
-/// As [`write()`], or the file cannot be created. What is whole, but can neither take the file's place nor be copied
-/// there, is left beside it.
+/// As [`write()`], or the file can be neither written nor created. [`ImageError::Beside`] says where the
+/// whole volume is if it can neither take the file's place nor be copied there.
 pub fn save<V: Voxel>(path: &Path, grid: &Grid, voxels: &[V]) -> Result<(), FileError> {
     let packs = path.extension().is_some_and(|extension| extension == "gz");
     let save = || {
         grid.check_length(voxels.len())?;
-        let there = fs::metadata(path);
+        let metadata = fs::metadata(path);
         // Where such a link leads to, only the system knows.
-        let leads_nowhere = there.is_err() && path.is_symlink();
-        if leads_nowhere || there.as_ref().is_ok_and(|there| !there.is_file()) {
+        let leads_nowhere = metadata.is_err() && path.is_symlink();
+        if leads_nowhere || metadata.as_ref().is_ok_and(|metadata| !metadata.is_file()) {
             return fill(&File::create(path)?, packs, grid, voxels);
         }
         // A link stays one.
         let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-        let (file, beside) = match create_beside(&place) {
+        // What takes a file's place is asked for the folder's permission only.
+        let there = match File::options().write(true).open(&place) {
+            Err(error) if error.kind() == ErrorKind::NotFound => None,
+            there => Some(there?),
+        };
+        let (file, beside) = match create_beside(&place, metadata.ok()) {
             Err(error) if !is_full(&error) => {
                 return fill(&File::create(place)?, packs, grid, voxels);
             }
             created => created?,
         };
-        let written = (|| {
-            if let Ok(there) = there {
-                file.set_permissions(there.permissions())?;
-            }
-            fill(&file, packs, grid, voxels)?;
-            Ok(file.sync_all()?)
-        })();
+        let written = fill(&file, packs, grid, voxels).and_then(|()| Ok(file.sync_all()?));
         if written.is_err() {
             // What the disk had no room for; why is told already.
             let _ = fs::remove_file(&beside);
             return written;
         }
         // Nothing takes the place of a file that is mounted alone.
-        if fs::rename(&beside, &place).is_err() {
-            // Permissions stay, which another's file would not have changed.
-            let mut there = File::options().write(true).truncate(true).open(&place)?;
-            io::copy(&mut File::open(&beside)?, &mut there)?;
-            there.sync_all()?;
-            fs::remove_file(&beside)?;
-        }
-        Ok(())
+        let moved = fs::rename(&beside, &place).or_else(|error| match there {
+            Some(there) => move_into(there, &beside),
+            None => Err(error),
+        });
+        moved.map_err(|source| ImageError::Beside { beside, source })
     };
     save().map_err(|source| FileError { path: path.to_owned(), source })
 }
 
-/// A new file beside one, and where it is.
-fn create_beside(place: &Path) -> io::Result<(File, PathBuf)> {
+/// A new file beside one, with the permissions of what is there, and where it is.
+fn create_beside(place: &Path, there: Option<Metadata>) -> io::Result<(File, PathBuf)> {
     for number in 0_u64.. {
         let mut beside = place.as_os_str().to_owned();
         beside.push(format!(".{}.{number}.part", process::id()));
-        match File::create_new(&beside) {
+        let file = match File::create_new(&beside) {
             // Another thread's, or left there by a process of the same number that was killed.
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-            created => return Ok((created?, beside.into())),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => continue,
+            created => created?,
+        };
+        if let Some(Err(error)) = there.map(|there| file.set_permissions(there.permissions())) {
+            fs::remove_file(&beside)?;
+            return Err(error);
         }
+        return Ok((file, beside.into()));
     }
     Err(ErrorKind::AlreadyExists.into())
+}
+
+/// Moves what is in the file beside one into that, which stays whose it is.
+fn move_into(mut there: File, beside: &Path) -> io::Result<()> {
+    let mut whole = File::open(beside)?;
+    there.set_len(0)?;
+    io::copy(&mut whole, &mut there)?;
+    there.sync_all()?;
+    fs::remove_file(beside)
 }
 
 /// Whether there was no room: then what is there must not be emptied.

@@ -22,11 +22,8 @@ impl Fields {
             line.clear();
             source.read_until(b'\n', &mut line)?;
             if line.pop_if(|byte| *byte == b'\n').is_none() {
-                let fields = Self(fields);
                 return match source.limit() {
                     0 => Err(ImageError::Header { most: MOST }),
-                    // No data follow, before which an empty line would have to be.
-                    left if fields.are_detached() => Ok((fields, MOST - left)),
                     left => Err(ImageError::Truncated { part: "header", needed: MOST - left + 1 }),
                 };
             }
@@ -41,11 +38,6 @@ impl Fields {
                 insert(&mut fields, &text)?;
             }
         }
-    }
-
-    /// Whether they say that the data are in another file.
-    pub(super) fn are_detached(&self) -> bool {
-        ["data file", "datafile"].iter().any(|name| self.get(name).is_some())
     }
 
     pub(super) fn get(&self, name: &str) -> Option<&str> {
@@ -78,6 +70,10 @@ fn insert(fields: &mut BTreeMap<String, String>, line: &str) -> Result<(), Image
         return wrong("a field, a comment or a key with its value");
     };
     let name = name.trim().to_lowercase();
+    // What follows may be a list of files, which are no fields, and end without an empty line.
+    if name == "data file" || name == "datafile" {
+        return Err(ImageError::Kind { kind: "NRRD with a detached header" });
+    }
     match fields.insert(name, value.trim().to_owned()) {
         None => Ok(()),
         Some(_) => wrong("the only one of its field"),

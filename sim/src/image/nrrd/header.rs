@@ -22,9 +22,6 @@ struct Axis {
 
 impl Header {
     pub(super) fn new(fields: &Fields) -> Result<Self, ImageError> {
-        if fields.are_detached() {
-            return Err(ImageError::Kind { kind: "NRRD with a detached header" });
-        }
         for name in ["byte skip", "byteskip", "line skip", "lineskip"] {
             match fields.get(name) {
                 None | Some("0") => {}

@@ -116,15 +116,20 @@ pub(super) fn tangents(direction: Vec3) -> [Vec3; 2] {
 /// The directions of all nodes, face by face.
 fn directions() -> impl Iterator<Item = Vec3> {
     // Exact, and so the same on both faces of an edge.
-    let coordinate = |index: usize| (2 * index) as f32 / CELLS as f32 - 1.0;
-    let nodes = |face| (0..NODES).flat_map(move |j| (0..NODES).map(move |i| (face, i, j)));
+    cube(CELLS).map(Vec3::normalize)
+}
+
+/// The nodes on the faces of a cube from −1 to 1, face by face: so many cells along each edge, and a node more.
+pub(super) fn cube(cells: usize) -> impl Iterator<Item = Vec3> {
+    let coordinate = move |index: usize| (2 * index) as f32 / cells as f32 - 1.0;
+    let nodes = move |face| (0..=cells).flat_map(move |j| (0..=cells).map(move |i| (face, i, j)));
     (0..6).flat_map(nodes).map(move |(face, i, j)| {
         let axis = face / 2;
-        let mut direction = Vec3::ZERO;
-        direction[axis] = if face % 2 == 0 { 1.0 } else { -1.0 };
-        direction[(axis + 1) % 3] = coordinate(i);
-        direction[(axis + 2) % 3] = coordinate(j);
-        direction.normalize()
+        let mut node = Vec3::ZERO;
+        node[axis] = if face % 2 == 0 { 1.0 } else { -1.0 };
+        node[(axis + 1) % 3] = coordinate(i);
+        node[(axis + 2) % 3] = coordinate(j);
+        node
     })
 }
 

@@ -90,7 +90,12 @@ impl<'a> Bone<'a> {
 
     /// The density of a voxel, of 255.
     fn density(&self, voxel: [u32; 3]) -> u8 {
-        (self.field.at(self.lattice.place(voxel)) + 0.5) as u8
+        self.density_at(self.lattice.place(voxel))
+    }
+
+    /// The density at a place in the world, of 255.
+    fn density_at(&self, place: Vec3) -> u8 {
+        (self.field.at(place) + 0.5) as u8
     }
 
     /// Whether the voxels from `first` on, so many along each axis, may hold bone; `false` only if they hold
@@ -174,24 +179,59 @@ impl<'a> Bone<'a> {
                 continue;
             }
             let voxel = [number % wide, number / wide % high, number / (wide * high)];
-            let within = |sample: u32| {
+            let place = |sample: u32| {
                 let [x, y, _] = samples;
                 let part = [sample % x, sample / x % y, sample / (x * y)];
                 let at = [0, 1, 2].map(|axis| {
                     let share = (f64::from(part[axis]) + 0.5) / f64::from(samples[axis]);
                     voxel[axis] as f64 - 0.5 + share
                 });
-                self.lattice.voxel(to_world(at))
+                to_world(at)
             };
-            let all = || (0..samples.iter().product()).filter_map(within);
-            let missing: u32 = all().map(|at| u32::from(gone[self.lattice.number(at)])).sum();
+            let places = || (0..samples.iter().product()).map(place);
+            let within = places().filter_map(|place| self.lattice.voxel(place));
+            let missing: u32 = within.map(|at| u32::from(gone[self.lattice.number(at)])).sum();
             if missing > 0 {
-                let all: u32 = all().map(|at| u32::from(self.density(at))).sum();
+                // A voxel may hold bone outside of the lattice, too, which stays.
+                let density = |place| match self.lattice.voxel(place) {
+                    Some(voxel) => self.density(voxel),
+                    None => self.density_at(place),
+                };
+                let all: u32 = places().map(|place| u32::from(density(place))).sum();
                 let left = f64::from(all.saturating_sub(missing)) / f64::from(all.max(1));
                 let above_air = f64::from(*hounsfield) - f64::from(AIR);
                 *hounsfield = (f64::from(AIR) + above_air.max(0.0) * left).round() as i16;
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DAffine3, DVec3};
+
+    use super::*;
+    use crate::image::Grid;
+    use crate::scene::head::frame::Frame;
+
+    /// Slices of 5 mm, all bone, and a lattice that begins half a millimetre below the second one's top.
+    #[test]
+    fn bone_below_the_lattice_stays() {
+        const SLICE: f64 = 0.005;
+        let dims = [3, 3, 4];
+        let affine = DAffine3::from_scale(DVec3::splat(SLICE));
+        let frame = Frame::new(&Grid::new(dims, affine).expect("allowed"), DVec3::ZERO);
+        let field = Field { voxels: &[255; 36], dims, frame, outside: 0 };
+        // From the patient's left, back and foot; the middle of the first voxel is the origin.
+        let corner = Vec3::new(-0.0125, -0.0025, 0.007);
+        let bone = Bone::new(Lattice { dims: [30, 30, 21], corner }, field).expect("few voxels");
+        let mut skull = bone.volume().expect("few voxels");
+        skull.remove(Vec3::ZERO, 1.0, |_| 255);
+        let to_world = |at| Frame::in_world(DVec3::ZERO, DVec3::from(at) * SLICE);
+        let mut hounsfield = [1_000; 36];
+        bone.carve(&mut hounsfield, &skull, &[], to_world, [10; 3]).expect("few voxels");
+        let middle: Vec<i16> = (0..4).map(|slice| hounsfield[9 * slice + 4]).collect();
+        assert_eq!(middle[..3], [1_000, 800, AIR]);
     }
 }

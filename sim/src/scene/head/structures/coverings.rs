@@ -8,6 +8,7 @@ use crate::geometry::Bounds;
 use crate::scene::head::anatomy::{Scale, scalp_at, site, temple, tentorium};
 use crate::scene::head::frame::{RIGHT, UP, parts};
 use crate::scene::head::layers::Layers;
+use crate::scene::head::radial::cube;
 use crate::scene::head::surface::{Surface, extract};
 
 /// How sheets are relaxed: 6 times there and back, which evens nodes and keeps the border's corners.
@@ -61,17 +62,10 @@ fn dura_at(direction: Vec3) -> Option<usize> {
 fn sheet(radius: &dyn Fn(Vec3) -> f32, spacing: f32, keep: impl Fn(Vec3) -> bool) -> Surface {
     let field = |point: Vec3| point.length() - radius(point);
     let mut bounds = Bounds::EMPTY;
-    for face in 0..6 {
-        for cell in 0..15 * 15 {
-            let coordinate = |index: i32| (2 * index) as f32 / 14.0 - 1.0;
-            let mut direction = Vec3::ZERO;
-            direction[face / 2] = if face % 2 == 0 { 1.0 } else { -1.0 };
-            direction[(face / 2 + 1) % 3] = coordinate(cell % 15);
-            direction[(face / 2 + 2) % 3] = coordinate(cell / 15);
-            let point = direction.normalize() * radius(direction);
-            if parts(point)[2] >= FLOOR {
-                bounds = bounds.union(&Bounds { min: point, max: point });
-            }
+    for direction in cube(14) {
+        let point = direction.normalize() * radius(direction);
+        if parts(point)[2] >= FLOOR {
+            bounds = bounds.union(&Bounds { min: point, max: point });
         }
     }
     let (rounds, shares) = RELAX;
