@@ -1,5 +1,6 @@
 //! The message passing interface (§6.2).
 
+use std::any::Any;
 use std::fmt;
 
 use crate::behavior::Instrument;
@@ -59,7 +60,10 @@ pub enum Message {
     TakeUp(Instrument),
     /// Takes the object out of the environment for good.
     Remove,
-    /// A message of the application's own making.
+    /// A message of the application's own making, or one of those of the engine's behaviours, as [`Grasp`] or [`Cut`].
+    ///
+    /// [`Grasp`]: crate::behavior::Grasp
+    /// [`Cut`]: crate::behavior::tissue::Cut
     Custom(Box<dyn Custom>),
 }
 
@@ -78,7 +82,7 @@ pub struct Letter {
 
 /// A message of the application's own making: the paper's base class with its *processMessage*
 /// callback.
-pub trait Custom: fmt::Debug + Send + Sync {
+pub trait Custom: Any + fmt::Debug + Send + Sync {
     /// Changes the object as the message says. Its number and group, and whether it is solitary, stay what they
     /// were, also if another object is put in its place; what is scenery stays grouped with scenery.
     fn process(&self, object: &mut Object);
