@@ -28,11 +28,14 @@ pub enum Message {
         /// Of the springs to the centre.
         to_center: f32,
     },
-    /// Sets the damping of a mass–spring body's springs, in newton seconds per metre; negative or
-    /// non-finite values are ignored. Usually 0.02 for a particle; [`MassSpring`] says how much is
-    /// stable.
+    /// Sets the damping of a mass–spring body's springs, in newton seconds per metre, usually 0.02 for a particle
+    /// ([`MassSpring`] says how much is stable); or that of a [`Tissue`], a rate per second, usually 1 to 10
+    /// ([`Material::damping`]). Negative or non-finite values are ignored. Who sends it has to know which of the two
+    /// the object is.
     ///
     /// [`MassSpring`]: crate::behavior::MassSpring
+    /// [`Tissue`]: crate::behavior::Tissue
+    /// [`Material::damping`]: crate::behavior::tissue::Material::damping
     Damping(f32),
     /// Pulls a mass–spring body by a damped spring from one node to a point fixed in space, in every
     /// update from this one on until it is released or pulled otherwise: a person holds it.
