@@ -4,6 +4,8 @@
 //! whoever posted first. All inboxes draw letters from one pool: a free slot is popped from a
 //! ring, filled, and pushed onto the receiver's list; the receiver takes the whole list at once.
 
+use ::core::fmt;
+
 use crate::error::{Table, TableFull};
 use crate::frame::Frame;
 use crate::list;
@@ -83,6 +85,15 @@ pub struct Rejected<M> {
     /// Why it was not.
     pub full: TableFull,
 }
+
+impl<M> fmt::Display for Rejected<M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { from: From { sender, sequence }, full, .. } = self;
+        write!(f, "letter {sequence} of sender {sender} was not posted: {full}")
+    }
+}
+
+impl<M: fmt::Debug> ::core::error::Error for Rejected<M> {}
 
 /// One unit's inbox: the newest letter, each leading to the one before.
 #[derive(Debug)]
@@ -260,6 +271,24 @@ mod tests {
             let next = post.collect(&inbox, frame.next().next());
             assert!(next.eq([(from(0, 0), 9)]), "what was posted in a frame stays for the next");
         }
+    }
+
+    #[test]
+    fn a_rejected_letter_is_an_error_that_says_whose_it_is_and_why() {
+        let mut slots = [const { LetterSlot::new() }; 1];
+        let mut queue = [const { QueueSlot::new() }; 1];
+        let post = Post::new(&mut slots, &mut queue).unwrap_or_else(|full| panic!("{full}"));
+        // SAFETY: there is one pool.
+        let inbox = unsafe { Inbox::new() };
+        let send = |sequence| -> Result<(), std::boxed::Box<dyn std::error::Error>> {
+            post.post(&inbox, Frame(0), From { sender: 7, sequence }, ())?;
+            Ok(())
+        };
+        assert!(send(3).is_ok());
+        let told = send(4).map_err(|rejected| std::format!("{rejected}"));
+        let expected = "letter 4 of sender 7 was not posted: table of letters under way is full: \
+                        1 fit, 2 needed";
+        assert_eq!(told, Err(expected.into()));
     }
 
     #[test]

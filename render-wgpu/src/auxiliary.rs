@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
 use thiserror::Error;
-use wgpu::{Buffer, CommandEncoder, MapMode, PollType};
+use wgpu::{Buffer, CommandEncoder, MapMode, PollType, TextureView};
 
 use crate::error::GraphicsError;
 use crate::globals::View;
@@ -41,8 +41,15 @@ pub trait GpuUnit: Send {
 pub struct Context<'a> {
     /// The device.
     pub gpu: &'a Gpu,
+    /// The pictures' width and height, in pixels.
+    pub size: (u32, u32),
+    /// The picture that was drawn, where a unit that [needs it](GpuUnit::needs_frame) is encoded; else none. The
+    /// commands come after those that draw it. What can be done with it is up to whoever made its texture; that of an
+    /// [`Offscreen`] can be copied from.
+    ///
+    /// [`Offscreen`]: crate::renderer::Offscreen
+    pub picture: Option<&'a TextureView>,
     pub(crate) view: &'a View,
-    pub(crate) size: (u32, u32),
     pub(crate) surfaces: &'a Surfaces,
     pub(crate) picker: &'a Picker,
     pub(crate) integrator: &'a Integrator,

@@ -27,7 +27,7 @@ pub enum GraphicsError {
         /// The adapter.
         adapter: String,
         /// What it lacks.
-        lacking: &'static str,
+        lacking: String,
     },
     /// The adapter gave no device.
     #[error("the graphics adapter {adapter} cannot be used: {reason}")]

@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use wgpu::{
     Adapter, AdapterInfo, Backends, Buffer, BufferDescriptor, BufferUsages, Device,
-    DeviceDescriptor, DownlevelFlags, Instance, InstanceDescriptor, PollType, PowerPreference,
-    Queue, RequestAdapterOptions, Surface,
+    DeviceDescriptor, DownlevelFlags, Instance, InstanceDescriptor, Limits, PollType,
+    PowerPreference, Queue, RequestAdapterOptions, Surface,
 };
 
 use crate::error::{GraphicsError, words_of};
@@ -48,6 +48,34 @@ impl Gpu {
         Self::from_instance(instance, Some(surface), name)
     }
 
+    /// A device that the host has already, of this adapter: textures of the one are the other's.
+    ///
+    /// It needs no feature, and [`Limits::downlevel_defaults`] or more. Of the limits that it was given, and not of the
+    /// adapter's, pictures, frames and volumes may take as much as there is.
+    ///
+    /// Whom the device tells that it is lost, and of errors outside of any error scope, is replaced: [`Gpu::failure`]
+    /// says so instead. Whatever goes wrong with the device, also by what the host does with it, ends the pictures.
+    ///
+    /// # Errors
+    /// An adapter that cannot draw what is needed, or a device that may do less.
+    pub fn from_device(
+        adapter: Adapter,
+        device: Device,
+        queue: Queue,
+    ) -> Result<Self, GraphicsError> {
+        let title = fit(&adapter)?;
+        let mut lacking = None;
+        let allowed = device.limits();
+        let needed = Limits::downlevel_defaults();
+        needed.check_limits_with_fail_fn(&allowed, true, |name, needed, allowed| {
+            lacking = Some(format!("a device whose {name} is {needed}, not {allowed}"));
+        });
+        match lacking {
+            None => Ok(Self::noting(adapter, device, queue)),
+            Some(lacking) => Err(GraphicsError::Unfit { adapter: title, lacking }),
+        }
+    }
+
     fn from_instance(
         instance: &Instance,
         surface: Option<&Surface<'_>>,
@@ -58,19 +86,21 @@ impl Gpu {
             Some(name) => by_name(instance, surface, name)?,
             None => preferred(instance, surface)?,
         };
-        let info = adapter.get_info();
-        if !adapter.get_downlevel_capabilities().flags.contains(DownlevelFlags::VERTEX_STORAGE) {
-            let lacking = "storage buffers in vertex shaders";
-            return Err(GraphicsError::Unfit { adapter: title(&info), lacking });
-        }
+        let title = fit(&adapter)?;
         let wanted = DeviceDescriptor { required_limits: adapter.limits(), ..Default::default() };
-        let (device, queue) =
-            pollster::block_on(adapter.request_device(&wanted)).map_err(|error| {
-                GraphicsError::NoDevice { adapter: title(&info), reason: one_line(&error) }
-            })?;
+        let requested = pollster::block_on(adapter.request_device(&wanted));
+        let (device, queue) = requested.map_err(|error| GraphicsError::NoDevice {
+            adapter: title,
+            reason: one_line(&error),
+        })?;
+        Ok(Self::noting(adapter, device, queue))
+    }
+
+    /// Has the device note what happens to it.
+    fn noting(adapter: Adapter, device: Device, queue: Queue) -> Self {
         let failure = Arc::new(Mutex::new(None));
         note_failures(&device, &failure);
-        Ok(Self { device, queue, adapter, failure })
+        Self { device, queue, adapter, failure }
     }
 
     /// The adapter.
@@ -150,6 +180,16 @@ fn note_failures(device: &Device, failure: &Arc<Mutex<Option<String>>>) {
     device.on_uncaptured_error(Arc::new(move |error| note(&wrong, one_line(&error))));
 }
 
+/// Sees that an adapter can draw what is needed, and gives its title.
+fn fit(adapter: &Adapter) -> Result<String, GraphicsError> {
+    let title = title(&adapter.get_info());
+    if !adapter.get_downlevel_capabilities().flags.contains(DownlevelFlags::VERTEX_STORAGE) {
+        let lacking = "storage buffers in vertex shaders".to_owned();
+        return Err(GraphicsError::Unfit { adapter: title, lacking });
+    }
+    Ok(title)
+}
+
 fn preferred(instance: &Instance, surface: Option<&Surface<'_>>) -> Result<Adapter, GraphicsError> {
     let options = RequestAdapterOptions {
         power_preference: PowerPreference::from_env().unwrap_or(PowerPreference::HighPerformance),
@@ -193,15 +233,36 @@ mod tests {
 
     use super::*;
 
-    /// A device that draws nothing, on any machine.
-    fn gpu() -> Gpu {
+    /// Of devices that draw nothing, on any machine.
+    fn instance() -> Instance {
         let noop = NoopBackendOptions { enable: true, ..Default::default() };
-        let instance = Instance::new(InstanceDescriptor {
+        Instance::new(InstanceDescriptor {
             backends: Backends::NOOP,
             backend_options: BackendOptions { noop, ..Default::default() },
             ..InstanceDescriptor::new_without_display_handle()
-        });
-        Gpu::from_instance(&instance, None, None).expect("it is always there")
+        })
+    }
+
+    fn gpu() -> Gpu {
+        Gpu::from_instance(&instance(), None, None).expect("it is always there")
+    }
+
+    #[test]
+    fn a_device_of_the_hosts_own_that_may_do_too_little_is_refused() {
+        let take = |required_limits: Limits| {
+            let adapter = preferred(&instance(), None).expect("it is always there");
+            let wanted = DeviceDescriptor { required_limits, ..Default::default() };
+            let requested = pollster::block_on(adapter.request_device(&wanted));
+            let (device, queue) = requested.expect("it may do less than the adapter");
+            Gpu::from_device(adapter, device, queue)
+        };
+        let least = Limits::downlevel_defaults();
+        let gpu = take(least.clone()).expect("it may do what is needed");
+        assert_eq!(gpu.device.limits(), least);
+        let error = take(Limits { max_storage_buffers_per_shader_stage: 1, ..least }).err();
+        let told = error.expect("it may do too little").to_string();
+        let lacking = "lacks a device whose max_storage_buffers_per_shader_stage is 4, not 1";
+        assert!(told.ends_with(lacking), "{told}");
     }
 
     #[test]

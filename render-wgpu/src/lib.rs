@@ -2,7 +2,8 @@
 //!
 //! One thread has it at a time, and what it does is only what must be single: an object's positions are copied as
 //! they are ([`renderer::Painter::add`]), and a frame is encoded and submitted in a handful of calls. Normals,
-//! colours and shadows are made on the device.
+//! colours and shadows are made on the device. Everything is drawn opaque: the fourth number of an object's
+//! [colour](dualframe_sim::object::VisualProperties::color) is not looked at.
 //!
 //! | module | what it has |
 //! |---|---|
@@ -33,3 +34,6 @@ pub mod springs;
 mod surface;
 mod target;
 mod volume;
+
+/// Whose devices, textures and encoders the renderer works with, in the version that it is built with.
+pub use wgpu;

@@ -25,7 +25,7 @@ use crate::volume::Volumes;
 /// The format of pictures without a window.
 pub const OFFSCREEN_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 
-/// Draws the objects of a frame into whatever texture it is given.
+/// Draws the objects of a frame into whatever texture it is given, all of them opaque.
 ///
 /// Objects are taken one by one, in any order; nothing is sent to the device before
 /// [`Painter::paint`] but what changed of volumes, and the springs of a [`GpuMassSpring`].
@@ -150,7 +150,7 @@ impl Painter {
         if let Some(springs) = GpuMassSpring::of(object)
             && gpu.failure().is_none()
         {
-            let context = Context { gpu, view, size, surfaces, picker, integrator };
+            let context = Context { gpu, size, picture: None, view, surfaces, picker, integrator };
             springs.integrate(&context, units);
         }
         if !view.may_see(&object.bounds()) {
@@ -216,10 +216,11 @@ impl Painter {
         drop(pass);
         let size = self.size();
         let Self { gpu, surfaces, picker, integrator, units, .. } = self;
-        let context = Context { gpu, view: &view, size, surfaces, picker, integrator };
+        let view = &view;
+        let context = Context { gpu, size, picture: None, view, surfaces, picker, integrator };
         units.finish(&context);
         units.run_now(&context);
-        units.encode(&context, encoder);
+        units.encode(&Context { picture: Some(picture), ..context }, encoder);
     }
 
     /// Nothing is drawn from now on: whoever waits for a unit of GPU work is told.
@@ -230,7 +231,9 @@ impl Painter {
         });
         let size = self.size();
         let Self { gpu, surfaces, picker, integrator, units, .. } = self;
-        units.refuse(&Context { gpu, view: &view, size, surfaces, picker, integrator }, &failure);
+        let view = &view;
+        let context = Context { gpu, size, picture: None, view, surfaces, picker, integrator };
+        units.refuse(&context, &failure);
         self.failure = Some(failure);
     }
 }

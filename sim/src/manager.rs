@@ -20,14 +20,16 @@ use crate::scene::Scene;
 use crate::stages::Stages;
 use crate::timeline::Timeline;
 
-/// How an environment is to be run. No setting changes a result.
+/// How an environment is to be run. No setting changes a result, unless a behaviour goes by whether it is drawn, as
+/// `GpuMassSpring` of `render-wgpu` does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// What drives the stages.
     pub executor: ExecutorKind,
     /// Threads, the calling one included (besides the calling one for rayon's executors): 1 to [`MAX_THREADS`].
     pub threads: usize,
-    /// Whether each thread is bound to a core, where the system can (pipeline only).
+    /// Whether the pipeline's threads are bound to cores, all but the calling one; see [`Pool::new`]. Other executors'
+    /// never are.
     pub pinned: bool,
     /// Blocks of objects, or every modelled pair by itself.
     pub grain: Grain,

@@ -1,5 +1,6 @@
 //! The message passing interface (§6.2).
 
+use std::any::Any;
 use std::fmt;
 
 use crate::behavior::Instrument;
@@ -27,11 +28,14 @@ pub enum Message {
         /// Of the springs to the centre.
         to_center: f32,
     },
-    /// Sets the damping of a mass–spring body's springs, in newton seconds per metre; negative or
-    /// non-finite values are ignored. Usually 0.02 for a particle; [`MassSpring`] says how much is
-    /// stable.
+    /// Sets the damping of a mass–spring body's springs, in newton seconds per metre, usually 0.02 for a particle
+    /// ([`MassSpring`] says how much is stable); or that of a [`Tissue`], a rate per second, usually 1 to 10
+    /// ([`Material::damping`]). Negative or non-finite values are ignored. Who sends it has to know which of the two
+    /// the object is.
     ///
     /// [`MassSpring`]: crate::behavior::MassSpring
+    /// [`Tissue`]: crate::behavior::Tissue
+    /// [`Material::damping`]: crate::behavior::tissue::Material::damping
     Damping(f32),
     /// Pulls a mass–spring body by a damped spring from one node to a point fixed in space, in every
     /// update from this one on until it is released or pulled otherwise: a person holds it.
@@ -59,7 +63,10 @@ pub enum Message {
     TakeUp(Instrument),
     /// Takes the object out of the environment for good.
     Remove,
-    /// A message of the application's own making.
+    /// A message of the application's own making, or one of those of the engine's behaviours, as [`Grasp`] or [`Cut`].
+    ///
+    /// [`Grasp`]: crate::behavior::Grasp
+    /// [`Cut`]: crate::behavior::tissue::Cut
     Custom(Box<dyn Custom>),
 }
 
@@ -78,7 +85,7 @@ pub struct Letter {
 
 /// A message of the application's own making: the paper's base class with its *processMessage*
 /// callback.
-pub trait Custom: fmt::Debug + Send + Sync {
+pub trait Custom: Any + fmt::Debug + Send + Sync {
     /// Changes the object as the message says. Its number and group, and whether it is solitary, stay what they
     /// were, also if another object is put in its place; what is scenery stays grouped with scenery.
     fn process(&self, object: &mut Object);

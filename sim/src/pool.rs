@@ -36,8 +36,12 @@ pub struct Pool {
 
 impl Pool {
     /// A pool of so many threads, the calling one included, 1 to [`MAX_THREADS`]; others are taken
-    /// for the nearest. `pinned` binds each thread but the calling one to a core of its own, where
-    /// the system can.
+    /// for the nearest.
+    ///
+    /// `pinned` binds the hired threads to the cores that this process may use, one after the other from the second on;
+    /// the calling thread is left to the system, and may be on any. With more threads than cores the first core has one
+    /// too, and then cores have several. Where the system cannot bind a thread, or does not say what cores there are,
+    /// the thread is left to it, and nobody is told.
     #[must_use]
     pub fn new(threads: usize, pinned: bool) -> Self {
         let threads = AtomicUsize::new(threads.clamp(1, MAX_THREADS));

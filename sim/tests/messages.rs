@@ -46,6 +46,7 @@ fn gossip(log: &Log) -> Scene {
     let talker = |id: u32| {
         let log = Arc::clone(log);
         let act = move |_: &mut Geometry, input: &mut Input<'_>| {
+            let id = input.object().0;
             if id == RECEIVER {
                 let entry = (ObjectId(RECEIVER), input.frame, u32::MAX, 0);
                 log.lock().expect("nobody panics").push(entry);

@@ -35,7 +35,14 @@ use crate::error::GraphicsError;
 /// changed the mesh in between, or if the device fails. The device adds up in another order and may
 /// divide less exactly: in 240 frames of vibration, falling and contacts a particle's nodes stay within
 /// 10 µm of the processor's. Results are the same for any number of threads as long as the device is the
-/// same, its driver too.
+/// same, its driver too, and whoever renders gives a [`Painter`] every frame.
+///
+/// So this is the exception to what [`Settings`] promises: the state's hash is another one without pictures, or with an
+/// executor that draws copies. A session that was recorded with pictures comes to a [`Difference`] in a replay without.
+///
+/// [`Painter`]: crate::renderer::Painter
+/// [`Settings`]: dualframe_sim::manager::Settings
+/// [`Difference`]: dualframe_sim::record::Difference
 ///
 /// One workgroup of 256 invocations integrates a body, whatever its size; different bodies at once.
 ///

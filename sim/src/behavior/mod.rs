@@ -46,6 +46,23 @@ pub use workspace::Workspace;
 pub(crate) use workspace::{CONTACTS_PER_OBJECT, Room, SpringWork};
 
 /// How an object changes from frame to frame.
+///
+/// # Threads of a callback's own
+///
+/// A callback of this trait, of [`Detection`], [`Response`] or [`Custom`], is called by one thread. It may have others
+/// help, if what comes of it does not depend on who does what. Those of [`std::thread::scope`] do with any executor.
+///
+/// Rayon's do with some. The pipeline's hired threads are those of a Rayon pool that has no others, and all of them are
+/// at work: a callback's parallel iterators and `rayon::join` are done there by the thread that begins them, and what
+/// is given to `rayon::spawn` waits until the run is over, so that a callback which waits for it never returns. In a
+/// pool of one's own, by [`ThreadPool::install`], that pool's threads do it all. With Rayon's own executors a callback
+/// must not wait for Rayon at all, not even so: see [`RayonExecutor`].
+///
+/// [`Detection`]: crate::interaction::Detection
+/// [`Response`]: crate::interaction::Response
+/// [`Custom`]: crate::message::Custom
+/// [`ThreadPool::install`]: rayon::ThreadPool::install
+/// [`RayonExecutor`]: crate::executor::RayonExecutor
 pub trait Behavior: Any + Send + Sync {
     /// Advances the geometry by one frame.
     fn update(&mut self, geometry: &mut Geometry, input: &mut Input<'_>);
@@ -96,6 +113,13 @@ pub struct Input<'a> {
 }
 
 impl Input<'_> {
+    /// The number of the object itself: the sender of what it posts, and the tool that a [`Grasp`], [`Hold`], [`LetGo`]
+    /// or [`Cut`](tissue::Cut) of its own is by.
+    #[must_use]
+    pub fn object(&self) -> ObjectId {
+        self.object
+    }
+
     /// What this frame's interactions did to the object, ordered by the other object's number.
     pub fn contacts(&self) -> impl Iterator<Item = Contact> + '_ {
         self.received.iter().flat_map(|segment| segment.contacts())

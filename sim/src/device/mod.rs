@@ -8,21 +8,80 @@
 //!
 //! | room | what it does |
 //! |---|---|
-//! | [`law`] | the force of each tick, as a state machine stepped by time and sample |
+//! | [`law`] | the force of each tick, as a state machine stepped by time and sample: new models come in, and forces change, without a kick; the energy that sampling and delay generate is limited; forces fade when no new model comes |
 //! | [`model`] | Eq. 1: force and gradient at a place, bounded to what the device can show |
 //! | [`proxy`] | contact with a surface: the god-object, and the local model it gives |
-//! | [`passivity`] | limits the energy that sampling and delay generate |
-//! | [`entry`] | new models come in, and forces change, without a kick |
-//! | [`watchdog`] | forces fade when no new model comes |
 //! | [`figures`] | what the loop measures about itself |
 //! | [`link`], [`thread`], [`priority`] | the two rates, joined |
 //! | [`mouse`], [`motion`], [`operator`] | devices: set from outside, scripted, simulated in a hand |
+//!
+//! A device of one's own, its loop, and frames that tell it what its tool meets:
+//!
+//! ```
+//! use std::thread::{scope, sleep};
+//! use std::time::Duration;
+//!
+//! use dualframe_sim::device::law::ForceSettings;
+//! use dualframe_sim::device::link::HapticLink;
+//! use dualframe_sim::device::model::LocalModel;
+//! use dualframe_sim::device::thread::{HapticThread, RATE};
+//! use dualframe_sim::device::{DeviceDescription, DeviceError, DeviceSample, HapticDevice, Wrench};
+//! use dualframe_sim::manager::{Settings, VeManager};
+//! use dualframe_sim::render::NullRenderer;
+//! use dualframe_sim::scene::ParticleScene;
+//! use glam::{Mat3, Vec3};
+//!
+//! /// A driver would ask its device, and tell it; this one's tip is held 1 mm below the floor.
+//! struct Pen;
+//!
+//! impl HapticDevice for Pen {
+//!     fn description(&self) -> DeviceDescription {
+//!         let (max_force, max_stiffness) = (3.3, 1_000.0); // N, N/m
+//!         DeviceDescription { max_force, max_stiffness, ..DeviceDescription::without_forces("pen") }
+//!     }
+//!
+//!     fn read(&mut self, _time: f64) -> Result<DeviceSample, DeviceError> {
+//!         Ok(DeviceSample::at(Vec3::NEG_Y * 1e-3))
+//!     }
+//!
+//!     fn write(&mut self, _wrench: Wrench) -> Result<(), DeviceError> {
+//!         Ok(())
+//!     }
+//! }
+//!
+//! let mut manager = VeManager::new(ParticleScene::new(10).build()?, Settings::default())?;
+//! let mut link = HapticLink::new();
+//! let (end, mut simulation) = link.split();
+//! scope(|scope| {
+//!     let haptics = HapticThread::spawn(scope, Pen, end, ForceSettings::at(RATE), RATE)?;
+//!     println!("{}", haptics.priority());
+//!     let mut tool = simulation.tool();
+//!     // Until the hand feels most of 1 N: models come in over some ticks.
+//!     while tool.wrench.force.y < 0.9 {
+//!         manager.run(1, &mut NullRenderer::new(), &mut |_| ())?;
+//!         tool = simulation.tool();
+//!         let (position, stiffness) = (tool.sample.position, 1_000.0);
+//!         simulation.deliver(LocalModel {
+//!             force: Vec3::NEG_Y * (stiffness * position.y),
+//!             gradient: Mat3::from_diagonal(Vec3::NEG_Y * stiffness),
+//!             position,
+//!             time: tool.time,
+//!             normal: Some(Vec3::Y),
+//!             ..LocalModel::FREE
+//!         })?;
+//!         sleep(Duration::from_millis(16)); // for the next picture
+//!     }
+//!     // Here the loop is dropped: it stops, and lets the device go.
+//!     Ok::<(), Box<dyn std::error::Error>>(())
+//! })?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! Positions are in metres, forces in newtons, torques in newton metres, times in seconds on the haptic
 //! loop's own clock, which begins with the loop.
 
 mod bone;
-pub mod entry;
+mod entry;
 pub mod figures;
 pub mod law;
 pub mod link;
@@ -30,12 +89,12 @@ pub mod model;
 pub mod motion;
 pub mod mouse;
 pub mod operator;
-pub mod passivity;
+mod passivity;
 pub mod priority;
 pub mod proxy;
 mod stiffness;
 pub mod thread;
-pub mod watchdog;
+mod watchdog;
 
 use glam::{Quat, Vec3};
 use thiserror::Error;

@@ -8,7 +8,7 @@ use super::parallel_for::{LoopExecutor, ParallelFor};
 
 /// A rayon pool of as many threads as asked for; the calling one, besides them, waits for them, and renders if the
 /// renderer [is bound](crate::render::Renderer::is_bound) to it. Callbacks must not use rayon: a thread that waits in
-/// one for another may begin the next callback, and would then wait for itself.
+/// one for another, be it of another pool, may begin the next callback, and would then wait for itself.
 pub type RayonExecutor = LoopExecutor<RayonLoops>;
 
 /// Rayon's parallel iterators, on a pool of their own.

@@ -38,14 +38,15 @@ pub use rules::{InteractionPair, RuleError, Rules};
 pub use shape::NodesInShape;
 pub use touches::{Touch, Touches};
 
-/// Finds where two objects touch.
+/// Finds where two objects touch. How it may be helped by other threads says [`Behavior`](crate::behavior::Behavior).
 pub trait Detection: Send + Sync {
     /// Adds the places where the objects touch. What it finds may depend on the two objects only. It is asked
     /// about those whose [extents overlap](crate::geometry::Extent::overlaps).
     fn detect(&self, first: &Object, second: &Object, touches: &mut Touches);
 }
 
-/// Says what touching does to two objects.
+/// Says what touching does to two objects. How it may be helped by other threads says
+/// [`Behavior`](crate::behavior::Behavior).
 pub trait Response: Send + Sync {
     /// Adds the impulses of one frame of `time_step` seconds on the one and on the other object. It
     /// is called only for objects that touch.

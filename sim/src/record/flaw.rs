@@ -29,7 +29,8 @@ pub enum RecordError {
     /// The environment is being recorded already.
     #[error("the environment is being recorded already")]
     Recorded,
-    /// A message of the application's own making came from outside, which nobody could read.
+    /// A custom message came from outside that a recording has no form for, as one of the application's own making:
+    /// nobody could read it.
     #[error("a message from outside to {to}, due in frame {due}, cannot be recorded: {message}")]
     Custom {
         /// Whom it was for.

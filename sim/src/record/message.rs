@@ -1,11 +1,16 @@
 //! Messages as bytes.
 
-use glam::{Quat, Vec3};
+use std::any::Any;
+
+use glam::Quat;
 
 use super::wire::{Decoder, Encoder, Malformed};
-use crate::behavior::Instrument;
+use crate::behavior::tissue::{Cut, Scrape};
+use crate::behavior::{Grasp, Hold, Instrument, LetGo};
 use crate::device::DeviceSample;
+use crate::geometry::Blade;
 use crate::message::{Custom, Message};
+use crate::object::ObjectId;
 
 const IMPULSE: u8 = 0;
 const STIFFNESS: u8 = 1;
@@ -16,8 +21,13 @@ const WEIGHTLESS: u8 = 5;
 const DEVICE: u8 = 6;
 const TAKE_UP: u8 = 7;
 const REMOVE: u8 = 8;
+const GRASP: u8 = 9;
+const HOLD: u8 = 10;
+const LET_GO: u8 = 11;
+const CUT: u8 = 12;
+const SCRAPE: u8 = 13;
 
-/// Writes a message, unless it is of the application's own making: nobody could read that.
+/// Writes a message, unless it is a custom one that is none of a host's for tissue and pieces: nobody could read that.
 pub(super) fn encode<'m>(message: &'m Message, to: &mut Encoder<'_>) -> Result<(), &'m dyn Custom> {
     match message {
         Message::Impulse { node, impulse } => {
@@ -55,7 +65,40 @@ pub(super) fn encode<'m>(message: &'m Message, to: &mut Encoder<'_>) -> Result<(
             to.byte(*instrument as u8);
         }
         Message::Remove => to.byte(REMOVE),
-        Message::Custom(custom) => return Err(&**custom),
+        Message::Custom(custom) => return encode_custom(&**custom, to),
+    }
+    Ok(())
+}
+
+fn encode_custom<'m>(
+    custom: &'m (dyn Custom + 'static),
+    to: &mut Encoder<'_>,
+) -> Result<(), &'m dyn Custom> {
+    let message: &dyn Any = custom;
+    if let Some(Grasp { by, point, radius, stiffness, strength }) = message.downcast_ref() {
+        to.byte(GRASP);
+        to.number(by.0.into());
+        to.floats(point.to_array());
+        to.floats([*radius, *stiffness, *strength]);
+    } else if let Some(Hold { by, position }) = message.downcast_ref() {
+        to.byte(HOLD);
+        to.number(by.0.into());
+        to.floats(position.to_array());
+    } else if let Some(LetGo { by }) = message.downcast_ref() {
+        to.byte(LET_GO);
+        to.number(by.0.into());
+    } else if let Some(Cut { by, before, now }) = message.downcast_ref() {
+        to.byte(CUT);
+        to.number(by.0.into());
+        for end in [before.tip, before.heel, now.tip, now.heel] {
+            to.floats(end.to_array());
+        }
+    } else if let Some(Scrape { center, radius }) = message.downcast_ref() {
+        to.byte(SCRAPE);
+        to.floats(center.to_array());
+        to.float(*radius);
+    } else {
+        return Err(custom);
     }
     Ok(())
 }
@@ -77,12 +120,21 @@ pub(super) fn decode(from: &mut Decoder<'_>) -> Result<Message, Malformed> {
         RELEASE => Message::Release,
         WEIGHTLESS => Message::Weightless(from.flag("weightlessness")?),
         DEVICE => Message::Device(DeviceSample {
-            position: Vec3::from_array(from.floats()?),
+            position: from.vector()?,
             orientation: Quat::from_array(from.floats()?),
             buttons: from.small("buttons")?,
         }),
         TAKE_UP => Message::TakeUp(instrument(from.byte()?)?),
         REMOVE => Message::Remove,
+        GRASP => {
+            let (by, point) = (tool(from)?, from.vector()?);
+            let [radius, stiffness, strength] = from.floats()?;
+            custom(Grasp { by, point, radius, stiffness, strength })
+        }
+        HOLD => custom(Hold { by: tool(from)?, position: from.vector()? }),
+        LET_GO => custom(LetGo { by: tool(from)? }),
+        CUT => custom(Cut { by: tool(from)?, before: blade(from)?, now: blade(from)? }),
+        SCRAPE => custom(Scrape { center: from.vector()?, radius: from.float()? }),
         value => return Err(Malformed::Value { what: "a message's kind", value: value.into() }),
     })
 }
@@ -92,8 +144,22 @@ fn instrument(number: u8) -> Result<Instrument, Malformed> {
     known.ok_or(Malformed::Value { what: "an instrument", value: number.into() })
 }
 
+fn custom(message: impl Custom) -> Message {
+    Message::Custom(Box::new(message))
+}
+
+fn tool(from: &mut Decoder<'_>) -> Result<ObjectId, Malformed> {
+    from.small("a tool").map(ObjectId)
+}
+
+fn blade(from: &mut Decoder<'_>) -> Result<Blade, Malformed> {
+    Ok(Blade { tip: from.vector()?, heel: from.vector()? })
+}
+
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
     use crate::object::Object;
 
@@ -111,6 +177,8 @@ mod tests {
             orientation: Quat::from_xyzw(0.1, f32::INFINITY, -2.0, 3.0),
             buttons: u32::MAX,
         };
+        let by = ObjectId(300);
+        let (point, other) = (Vec3::new(1.0, -0.0, strange), Vec3::new(f32::MAX, 1e-40, -3.0));
         let mut messages = vec![
             Message::Impulse { node: u32::MAX, impulse: [1.0, -2.0, strange] },
             Message::Stiffness { between_nodes: 60.0, to_center: f32::NAN },
@@ -121,6 +189,15 @@ mod tests {
             Message::Weightless(false),
             Message::Device(sample),
             Message::Remove,
+            custom(Grasp { by, point, radius: 0.005, stiffness: f32::INFINITY, strength: strange }),
+            custom(Hold { by: ObjectId::HOST, position: point }),
+            custom(LetGo { by }),
+            custom(Cut {
+                by,
+                before: Blade { tip: point, heel: other },
+                now: Blade { tip: other, heel: -point },
+            }),
+            custom(Scrape { center: other, radius: strange }),
         ];
         messages.extend(Instrument::ALL.map(Message::TakeUp));
         messages
@@ -146,10 +223,13 @@ mod tests {
 
     #[test]
     fn what_is_no_message() {
-        for bytes in [&[9][..], &[TAKE_UP, 7], &[WEIGHTLESS, 2]] {
+        // No object has the number 2³².
+        let no_tool = [LET_GO, 0x80, 0x80, 0x80, 0x80, 0x10];
+        for bytes in [&[14][..], &[TAKE_UP, 7], &[WEIGHTLESS, 2], &no_tool] {
             assert!(matches!(decode(&mut Decoder(bytes)), Err(Malformed::Value { .. })));
         }
-        let own = Message::Custom(Box::new(Own));
-        assert!(encode(&own, &mut Encoder(&mut Vec::new())).is_err());
+        let mut bytes = Vec::new();
+        assert!(encode(&custom(Own), &mut Encoder(&mut bytes)).is_err());
+        assert!(bytes.is_empty(), "nothing is left of it");
     }
 }

@@ -5,6 +5,34 @@
 //! to, and every [`CHECKPOINT_FRAMES`] frames the hash of every object; a [`Replay`] gives them to another
 //! run of the same scene, checks the hashes, and says where the two part and in which objects.
 //!
+//! ```
+//! use dualframe_sim::manager::{Settings, VeManager};
+//! use dualframe_sim::message::Message;
+//! use dualframe_sim::object::ObjectId;
+//! use dualframe_sim::record::{Header, Recorder, Replay, Step};
+//! use dualframe_sim::render::NullRenderer;
+//! use dualframe_sim::scene::ParticleScene;
+//!
+//! // 100 frames of ten particles, of which somebody pushes one.
+//! let particles = ParticleScene::new(10);
+//! let mut manager = VeManager::new(particles.build()?, Settings::default())?;
+//! let mut recorder = Recorder::begin(Vec::new(), &Header::of(&particles), &manager)?;
+//! manager.mailbox().post(ObjectId(3), Message::Impulse { node: 0, impulse: [1e-3, 0.0, 0.0] });
+//! recorder.run(&mut manager, 100, &mut NullRenderer::new(), &mut |_| ())?;
+//! let (file, _) = recorder.finish(&manager)?;
+//! let recorded = manager.state_hash();
+//!
+//! // The same once more, on one thread.
+//! let mut replay = Replay::new(&file[..])?;
+//! let mut scene = replay.header().scene::<ParticleScene>()?.build()?;
+//! replay.begin(&mut scene);
+//! let mut manager = VeManager::new(scene, Settings { threads: 1, ..Settings::default() })?;
+//! // At each step a checkpoint has agreed, or 1,000 frames are done.
+//! while replay.advance(&mut manager, 1_000, &mut NullRenderer::new(), &mut |_| ())? != Step::Over {}
+//! assert_eq!((replay.letters(), manager.state_hash()), (1, recorded));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! # The format
 //!
 //! All is little-endian and the same on every machine. *number* is LEB128, in as few bytes as it needs;
@@ -28,15 +56,37 @@
 //!   before; then [events](Event) until the content ends. An event is a byte, its kind; a number, by how
 //!   many frames it is later than the one before of its sort (messages, or all others), or than the F of
 //!   the chunk before if that is later; and
-//!   - 0, message: number, the object; the message;
+//!   - 0, message: number, the object; the [message](#messages);
 //!   - 1, gravity: 3 floats; 2, time step: float;
 //!   - 3, objects added: bytes;
 //!   - 4, checkpoint: number, how many objects; 8 bytes each, their hashes. The state's hash follows. Nothing, and
 //!     no F, is more than 60 frames after the last one, or 61 if it is a message; the last F has one.
 //! - End: numbers, of frames, messages, controls, additions and checkpoints.
 //!
+//! ## Messages
+//!
+//! A byte, the kind, and
+//! - 0, impulse: number, the node; 3 floats;
+//! - 1, stiffness: 2 floats; 2, damping: float;
+//! - 3, pull: number, the node; 3 floats, the target; float, the stiffness; 4, release;
+//! - 5, weightless: byte, 0 or 1;
+//! - 6, device: 7 floats, position and orientation; number, the buttons; 7, take up: byte, the instrument;
+//! - 8, remove;
+//! - 9, [`Grasp`]: number, the tool; 3 floats, the point; 3 floats, radius, stiffness and strength;
+//! - 10, [`Hold`]: number, the tool; 3 floats; 11, [`LetGo`]: number, the tool;
+//! - 12, [`Cut`]: number, the tool; 12 floats, tip and heel before and now;
+//! - 13, [`Scrape`]: 4 floats, middle and radius.
+//!
+//! A chunk with a kind that is not known is not whole: so kinds are added without another version.
+//!
 //! A chunk is written about once a second. A file that is cut off or altered is whole up to its first chunk that is not,
 //! and plays until the F of the last one that is.
+//!
+//! [`Grasp`]: crate::behavior::Grasp
+//! [`Hold`]: crate::behavior::Hold
+//! [`LetGo`]: crate::behavior::LetGo
+//! [`Cut`]: crate::behavior::tissue::Cut
+//! [`Scrape`]: crate::behavior::tissue::Scrape
 
 mod chunk;
 mod event;

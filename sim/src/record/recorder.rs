@@ -29,13 +29,21 @@ const MANY_BYTES: usize = 1 << 18;
 /// whoever posts them.
 ///
 /// The environment may be taken out and go on in another executor meanwhile; its mailbox goes with it.
-/// Messages of the application's own making cannot be recorded if they come from outside; those that
-/// objects send each other need no recording, nor does anything else that follows from what is recorded.
+/// Of [custom messages](crate::message::Message::Custom) that come from outside [`Grasp`], [`Hold`], [`LetGo`],
+/// [`Cut`] and [`Scrape`] are recorded; any other, as one of the application's own making, cannot be, and ends the
+/// recording. Those that objects send each other need no recording, nor does anything else that follows from what is
+/// recorded.
 /// Changes of rules are not recorded, and an environment with a callback budget is not repeatable.
 ///
 /// After an error, and if it is dropped, it records no longer, and the environment goes on as it would
 /// have; what was written is a recording that is cut off. Only where threads could not be had
 /// ([`ExecutorError::can_go_on`](crate::executor::ExecutorError::can_go_on)) does it go on.
+///
+/// [`Grasp`]: crate::behavior::Grasp
+/// [`Hold`]: crate::behavior::Hold
+/// [`LetGo`]: crate::behavior::LetGo
+/// [`Cut`]: crate::behavior::tissue::Cut
+/// [`Scrape`]: crate::behavior::tissue::Scrape
 pub struct Recorder<W: Write> {
     writer: ChunkWriter<W>,
     journal: Arc<Mutex<Journal>>,

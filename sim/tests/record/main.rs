@@ -4,4 +4,5 @@
 
 mod files;
 mod session;
+mod tissue;
 mod ways;

@@ -139,6 +139,10 @@ impl<'c> Operation<'c> {
     /// Looks for freed bone between two runs, and makes objects of it. Gives the manager back, or another
     /// one of the same settings, which `manage` makes, and how many objects are new.
     ///
+    /// It looks only before frames whose numbers are multiples of [`LOOK_FRAMES`], so that bone comes free in the same
+    /// frame however long the runs are; before all others it gives the manager back as it is. So its host ends a run
+    /// before each of these frames, and looks then: a run has at most `LOOK_FRAMES - manager.frame() % LOOK_FRAMES`.
+    ///
     /// # Errors
     /// Those of `manage`, which has the environment then.
     pub fn look<E>(
