@@ -8,13 +8,15 @@ use super::{WIDEST, sum};
 use crate::geometry::{Bounds, Extent};
 use crate::simd::Arithmetic;
 
-/// Notes where the bodies with these nodes are.
+/// Notes where the bodies with these nodes are, so many and 0 in whole [`LANES`](crate::geometry::LANES).
 #[inline(always)]
 pub(super) fn measure<A: Arithmetic<Lanes: Columns>>(
     isa: A,
-    nodes: &[Node<A::Lanes>],
+    all: &[Node<A::Lanes>],
+    count: usize,
     bodies: &mut [Option<Body<'_>>; WIDEST],
 ) {
+    let nodes = &all[..count];
     let zero = isa.splat(0.0);
     let (mut low, mut high) = ([isa.splat(f32::INFINITY); 3], [isa.splat(f32::NEG_INFINITY); 3]);
     for node in nodes {
@@ -22,17 +24,16 @@ pub(super) fn measure<A: Arithmetic<Lanes: Columns>>(
         low = [isa.min(x, low[0]), isa.min(y, low[1]), isa.min(z, low[2])];
         high = [isa.max(x, high[0]), isa.max(y, high[1]), isa.max(z, high[2])];
     }
-    let count = isa.splat(nodes.len() as f32);
     // By itself a mesh begins with 0: it is never −0.
-    let center = plus(isa, sum(isa, nodes, |node| &node.position), [zero; 3]);
-    let center = center.map(|axis| isa.div(axis, count));
+    let center = plus(isa, sum(isa, all, |node| &node.position), [zero; 3]);
+    let center = center.map(|axis| isa.div(axis, isa.splat(count as f32)));
     let mut most = zero;
     for node in nodes {
         let [x, y, z] = minus(isa, load(isa, &node.position), center);
         let square = isa.add(isa.add(isa.mul(x, x), isa.mul(y, y)), isa.mul(z, z));
         most = isa.max(square, most);
     }
-    let velocities = sum(isa, nodes, |node| &node.velocity);
+    let velocities = sum(isa, all, |node| &node.velocity);
     let [low, high, center, velocities] =
         [low, high, center, velocities].map(|vector| vector.map(|axis| stored(isa, axis)));
     let radius = stored(isa, isa.sqrt(most));

@@ -86,7 +86,9 @@ fn advance_all<A: Arithmetic<Lanes: Columns>, H: HalfIsa>(
     let Set { nodes: [now, next], weights: [weights, next_weights], forces } = set;
     let (now, next) = (&mut now[..len], &mut next[..len]);
     let (weights, next_weights) = (&mut weights[..len], &mut next_weights[..len]);
-    let forces = &mut forces[..topology.nodes()];
+    let forces = &mut forces[..len];
+    // Where another topology's nodes may have been.
+    forces[topology.nodes()..].fill(Force::default());
     if alike {
         weigh(isa, any, weights);
     } else {
@@ -125,7 +127,7 @@ fn advance_all<A: Arithmetic<Lanes: Columns>, H: HalfIsa>(
     }
     for (nodes, bodies) in [(&*now, first), (&*next, second)] {
         if bodies.iter().any(Option::is_some) {
-            measure(isa, &nodes[..topology.nodes()], bodies);
+            measure(isa, nodes, topology.nodes(), bodies);
             scatter(half, nodes, bodies);
         }
     }
@@ -243,7 +245,7 @@ impl<V: Copy> Step<V> {
         let shared = pull_to_center(isa, topology, nodes, forces, to_center);
         edge_forces(isa, topology, nodes, forces, edges);
         for ((node, Weight { mass, inverse }), Force(force, _)) in
-            nodes.iter_mut().zip(weights).zip(forces)
+            nodes.iter_mut().zip(weights).zip(&forces[..topology.nodes()])
         {
             // Else the compiler takes four nodes at a time where registers are short, which takes longer.
             black_box(());
@@ -328,8 +330,7 @@ fn pull_to_center<A: Arithmetic<Lanes: Columns>, L: Law<A>>(
         forces.fill(Force::default());
         return zero;
     };
-    let nodes = &nodes[..forces.len()];
-    let share = 1.0 / nodes.len() as f32;
+    let share = 1.0 / topology.nodes() as f32;
     let center = sum(isa, nodes, |node| &node.position);
     let center = times(isa, center, isa.splat(share));
     let velocity = if L::NEEDS_VELOCITY { sum(isa, nodes, |node| &node.velocity) } else { zero };
@@ -345,42 +346,34 @@ fn pull_to_center<A: Arithmetic<Lanes: Columns>, L: Law<A>>(
     plus(isa, times(isa, total, isa.splat(-share)), zero)
 }
 
-/// The sum over a body's nodes in the order in which a body by itself takes it: over every
-/// [`LANES`]th node, then these sums as in [`fold`]. Where all are −0 it is −0, and that one is +0; nothing that is
-/// computed with it shows which.
+/// The sum over a body's nodes, in whole [`LANES`] of which those beyond the last are 0, in the order in which a body by
+/// itself takes it: over every [`LANES`]th node, then these sums as in [`fold`]. Where all are −0 it may be −0, and that
+/// one is +0; nothing that is computed with it shows which.
 ///
 /// [`fold`]: crate::simd::fold
 #[inline(always)]
 fn sum<A: Arithmetic, T>(isa: A, nodes: &[T], of: fn(&T) -> &[A::Lanes; 3]) -> [A::Vector; 3] {
-    let zero = [isa.splat(0.0); 3];
-    let mut sums = [zero; HALF];
-    for (lane, sum) in sums.iter_mut().enumerate() {
-        let (low, high) = (every(isa, nodes, lane, of), every(isa, nodes, lane + HALF, of));
-        *sum = plus(isa, low, high);
-    }
-    let mut half = HALF / 2;
-    while half > 0 {
-        for lane in 0..half {
-            sums[lane] = plus(isa, sums[lane], sums[lane + half]);
+    let mut total = [isa.splat(0.0); 3];
+    let (chunks, _) = nodes.as_chunks::<LANES>();
+    let Some((first, rest)) = chunks.split_first() else { return total };
+    for (axis, total) in total.iter_mut().enumerate() {
+        let mut sums = [*total; LANES];
+        for lane in 0..LANES {
+            sums[lane] = isa.load(&of(&first[lane])[axis]);
         }
-        half /= 2;
+        for chunk in rest {
+            for lane in 0..LANES {
+                sums[lane] = isa.add(sums[lane], isa.load(&of(&chunk[lane])[axis]));
+            }
+        }
+        let mut half = HALF;
+        while half > 0 {
+            for lane in 0..half {
+                sums[lane] = isa.add(sums[lane], sums[lane + half]);
+            }
+            half /= 2;
+        }
+        *total = sums[0];
     }
-    sums[0]
-}
-
-/// The sum over every [`LANES`]th node from the first given on.
-#[inline(always)]
-fn every<A: Arithmetic, T>(
-    isa: A,
-    nodes: &[T],
-    first: usize,
-    of: fn(&T) -> &[A::Lanes; 3],
-) -> [A::Vector; 3] {
-    let mut rest = nodes.iter().skip(first).step_by(LANES);
-    let Some(node) = rest.next() else { return [isa.splat(0.0); 3] };
-    let mut sum = load(isa, of(node));
-    for node in rest {
-        sum = plus(isa, sum, load(isa, of(node)));
-    }
-    sum
+    total
 }
