@@ -3,7 +3,8 @@
 /// The visual properties module of an object (Fig. 2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VisualProperties {
-    /// Red, green, blue and opacity, linear, from 0 to 1.
+    /// Red, green, blue and opacity, linear, from 0 to 1. What opacity does is for the renderer to say: that of
+    /// `render-wgpu` draws all opaque.
     pub color: [f32; 4],
 }
 
