@@ -10,7 +10,8 @@ use dualframe_render_wgpu::picture::Picture;
 use dualframe_render_wgpu::renderer::Offscreen;
 use dualframe_render_wgpu::wgpu::{
     Buffer, BufferDescriptor, BufferUsages, CommandEncoder, DeviceDescriptor, Instance,
-    InstanceDescriptor, Limits, TexelCopyBufferInfo, TexelCopyBufferLayout,
+    InstanceDescriptor, Limits, PowerPreference, RequestAdapterOptions, TexelCopyBufferInfo,
+    TexelCopyBufferLayout,
 };
 use dualframe_sim::behavior::Fixed;
 use dualframe_sim::geometry::{Bounds, Geometry, Rigid, Volume};
@@ -47,7 +48,10 @@ fn draw(offscreen: &mut Offscreen, color: [f32; 4]) -> Picture {
 /// A host's device with the least limits that there may be.
 fn of_a_host() -> Gpu {
     let instance = Instance::new(InstanceDescriptor::new_without_display_handle_from_env());
-    let request = instance.request_adapter(&Default::default());
+    // Where there are several, the one that `Gpu::new` takes.
+    let power_preference = PowerPreference::from_env().unwrap_or(PowerPreference::HighPerformance);
+    let options = RequestAdapterOptions { power_preference, ..Default::default() };
+    let request = instance.request_adapter(&options);
     let adapter = pollster::block_on(request).expect("there is a graphics adapter");
     let required_limits = Limits::downlevel_defaults();
     let wanted = DeviceDescriptor { required_limits, ..Default::default() };

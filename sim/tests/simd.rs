@@ -267,6 +267,25 @@ fn flat_bodies_beside_others() {
 }
 
 #[test]
+fn bodies_without_nodes_beside_others() {
+    let topology = Topology::new(&[], Vec::new(), &[], true).expect("no nodes");
+    let mesh = Mesh::new(Arc::new(topology), &[], &[], 0.1).expect("no masses");
+    let empty = |id| {
+        let springs = MassSpring::new(1.0, 0.0, 1).expect("allowed");
+        Object::new(ObjectId(id), Group(0), Geometry::Mesh(mesh.clone()), springs)
+    };
+    for simd in available() {
+        for size in [1, 16] {
+            let objects = outcome((0..16).map(empty).collect(), stages(simd), size);
+            assert!(
+                objects.iter().all(|object| object.quarantined().is_none()),
+                "{simd:?}, {size}"
+            );
+        }
+    }
+}
+
+#[test]
 fn a_limit_on_time_changes_nothing_else() {
     let budget = Some(Duration::from_secs(3_600));
     let together = outcome(bodies(1, 60), stages(Simd::detect()), 60);

@@ -52,9 +52,9 @@ pub(crate) use workspace::{CONTACTS_PER_OBJECT, Room, SpringWork};
 /// A callback of this trait, of [`Detection`], [`Response`] or [`Custom`], is called by one thread. It may have others
 /// help, if what comes of it does not depend on who does what. Those of [`std::thread::scope`] do with any executor.
 ///
-/// Rayon's do with some. The pipeline's hired threads are those of a Rayon pool that has no others, and all of them are
-/// at work: a callback's parallel iterators and `rayon::join` are done there by the thread that begins them, and what
-/// is given to `rayon::spawn` waits until the run is over, so that a callback which waits for it never returns. In a
+/// Rayon's do with some. The pipeline's hired threads are those of a Rayon pool that has no others, and usually all of
+/// them are at work: a callback's parallel iterators and `rayon::join` are done there by the thread that begins them, and
+/// what is given to `rayon::spawn` waits until the run is over, so that a callback which waits for it never returns. In a
 /// pool of one's own, by [`ThreadPool::install`], that pool's threads do it all. With Rayon's own executors a callback
 /// must not wait for Rayon at all, not even so: see [`RayonExecutor`].
 ///

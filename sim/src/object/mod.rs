@@ -169,8 +169,8 @@ impl Object {
 
     /// Fits box and centre to a geometry that was changed from outside, and takes the object for scenery or not by
     /// its behaviour. That is done where an executor takes over a scene; within an environment box and centre
-    /// are fitted after every update. An object whose shape or behaviour panics then is nowhere, and its next update
-    /// excludes it; one that is excluded is left as it is.
+    /// are fitted after every update. An object whose shape panics then is nowhere, and its next update excludes it; one
+    /// whose behaviour does is nowhere until then. One that is excluded is left as it is.
     pub fn refit(&mut self) {
         if self.quarantined.is_some() {
             return;
@@ -181,7 +181,7 @@ impl Object {
                 self.fixed = fixed;
                 self.fit(extent);
             }
-            // The next update, in whose frame it is excluded, asks again.
+            // The next update asks the shape again, and excludes the object in its frame.
             Err(_) => self.fit(Extent { finite: false, ..Extent::EMPTY }),
         }
     }

@@ -24,9 +24,10 @@ pub(super) fn measure<A: Arithmetic<Lanes: Columns>>(
         low = [isa.min(x, low[0]), isa.min(y, low[1]), isa.min(z, low[2])];
         high = [isa.max(x, high[0]), isa.max(y, high[1]), isa.max(z, high[2])];
     }
-    // By itself a mesh begins with 0: it is never −0.
+    // By itself a mesh adds zeros: neither is ever −0.
+    let low = plus(isa, low, [zero; 3]);
     let center = plus(isa, sum(isa, all, |node| &node.position), [zero; 3]);
-    let center = center.map(|axis| isa.div(axis, isa.splat(count as f32)));
+    let center = center.map(|axis| isa.div(axis, isa.splat(count.max(1) as f32)));
     let mut most = zero;
     for node in nodes {
         let [x, y, z] = minus(isa, load(isa, &node.position), center);

@@ -1,6 +1,6 @@
 //! Volumes out.
 
-use std::fs::{self, File, Metadata};
+use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process;
@@ -43,10 +43,10 @@ voxel!(u16, 512);
 
 /// Writes a volume to a file, packed by gzip if its name ends in `.gz`; as [`write()`].
 ///
-/// It is written beside the file and takes its place when it is whole, so that a full disk leaves what was there. Where
-/// nothing can be put beside it (the folder is another's, the name is too long for more, the disk knows no such
-/// permissions), and where it is a device, a pipe or a link to a file that is not there yet, it is written as it is. A
-/// file that may not be written stays as it is.
+/// It is written beside the file and takes its place when it is whole, so that a full disk leaves what was there; if it
+/// cannot (the disk lets nobody give it the file's permissions, the file is mounted alone), it is copied there. Where
+/// nothing can be put beside it (the folder is another's, the name is too long for more), and where it is a device, a
+/// pipe or a link to a file that is not there yet, it is written as it is. A file that may not be written stays as it is.
 ///
 /// # Errors
 /// As [`write()`], or the file can be neither written nor created. [`ImageError::Beside`] says where the
@@ -68,43 +68,40 @@ pub fn save<V: Voxel>(path: &Path, grid: &Grid, voxels: &[V]) -> Result<(), File
             Err(error) if error.kind() == ErrorKind::NotFound => None,
             there => Some(there?),
         };
-        let (file, beside) = match create_beside(&place, metadata.ok()) {
+        let (file, beside) = match create_beside(&place) {
             Err(error) if !is_full(&error) => {
                 return fill(&File::create(place)?, packs, grid, voxels);
             }
             created => created?,
         };
+        // Before anything is in it: nobody is to read that who could not read what was there.
+        let guarded = metadata.map_or(Ok(()), |there| file.set_permissions(there.permissions()));
         let written = fill(&file, packs, grid, voxels).and_then(|()| Ok(file.sync_all()?));
         if written.is_err() {
             // What the disk had no room for; why is told already.
             let _ = fs::remove_file(&beside);
             return written;
         }
-        // Nothing takes the place of a file that is mounted alone.
-        let moved = fs::rename(&beside, &place).or_else(|error| match there {
-            Some(there) => move_into(there, &beside),
-            None => Err(error),
-        });
+        let moved =
+            guarded.and_then(|()| fs::rename(&beside, &place)).or_else(|error| match there {
+                Some(there) => move_into(there, &beside),
+                None => Err(error),
+            });
         moved.map_err(|source| ImageError::Beside { beside, source })
     };
     save().map_err(|source| FileError { path: path.to_owned(), source })
 }
 
-/// A new file beside one, with the permissions of what is there, and where it is.
-fn create_beside(place: &Path, there: Option<Metadata>) -> io::Result<(File, PathBuf)> {
+/// A new file beside one, and where it is.
+fn create_beside(place: &Path) -> io::Result<(File, PathBuf)> {
     for number in 0_u64.. {
         let mut beside = place.as_os_str().to_owned();
         beside.push(format!(".{}.{number}.part", process::id()));
-        let file = match File::create_new(&beside) {
+        match File::create_new(&beside) {
             // Another thread's, or left there by a process of the same number that was killed.
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => continue,
-            created => created?,
-        };
-        if let Some(Err(error)) = there.map(|there| file.set_permissions(there.permissions())) {
-            fs::remove_file(&beside)?;
-            return Err(error);
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            created => return Ok((created?, beside.into())),
         }
-        return Ok((file, beside.into()));
     }
     Err(ErrorKind::AlreadyExists.into())
 }
