@@ -155,10 +155,11 @@ impl Stages {
         let Workspace { received: memory, springs, order } = workspace;
         let mut received = mem::take(memory);
         received.extend(block, results);
+        block.prefetch_first(self.simd);
         // Interactions found the objects where they were before.
         block.put_in_order(order);
         for place in 0..block.objects.len() {
-            block.prefetch_after(place);
+            block.prefetch_after(place, self.simd);
             let object = &mut block.objects[place];
             let received = received.at(order.get(place).map_or(place, |seat| seat.before));
             if object.quarantined().is_some() {

@@ -168,14 +168,19 @@ impl Block {
         self.list_costs();
     }
 
-    /// Asks for what the updates soon after that of the object at `place` read: with many objects that is in no near
-    /// cache.
-    pub(crate) fn prefetch_after(&self, place: usize) {
+    /// Asks for what the updates of the first objects change.
+    pub(crate) fn prefetch_first(&self, simd: Simd) {
+        self.objects.iter().take(AHEAD).for_each(|first| first.prefetch_parts(simd));
+    }
+
+    /// Asks for what the updates soon after that of the object at `place` change: with many objects that is in no near
+    /// cache, and with several cores in another one's, too, where it interacted.
+    pub(crate) fn prefetch_after(&self, place: usize, simd: Simd) {
         if let Some(later) = self.objects.get(place + 2 * AHEAD) {
             prefetch(later);
         }
         if let Some(later) = self.objects.get(place + AHEAD) {
-            later.prefetch_parts();
+            later.prefetch_parts(simd);
         }
     }
 

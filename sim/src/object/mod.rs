@@ -14,7 +14,7 @@ use crate::behavior::{Behavior, Fixed};
 use crate::cost::Cost;
 use crate::geometry::{Bounds, Extent, Geometry};
 use crate::message::Message;
-use crate::simd::{Simd, prefetch};
+use crate::simd::{Simd, prefetch, prefetch_to_write};
 
 pub use fault::{Fault, FaultKind};
 pub use visual::{Drawing, VisualProperties};
@@ -208,12 +208,14 @@ impl Object {
         }
     }
 
-    /// Asks for what an update reads of it beside the object itself.
+    /// Asks for what an update reads and changes of it beside the object itself.
     #[inline]
-    pub(crate) fn prefetch_parts(&self) {
+    pub(crate) fn prefetch_parts(&self, simd: Simd) {
         prefetch(&*self.behavior);
         if let Some(mesh) = self.geometry.as_mesh() {
-            mesh.lines().into_iter().for_each(prefetch);
+            for lines in mesh.lines() {
+                prefetch_to_write(simd, lines);
+            }
         }
     }
 

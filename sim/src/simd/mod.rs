@@ -20,7 +20,7 @@ use thiserror::Error;
 use self::scalar::Plain;
 use crate::geometry::{LANES, Lanes};
 
-pub(crate) use self::prefetch::prefetch;
+pub(crate) use self::prefetch::{prefetch, prefetch_to_write};
 #[cfg(target_arch = "x86_64")]
 use self::{avx2::Avx2, avx512::Avx512};
 
