@@ -15,7 +15,7 @@ use crate::block::Block;
 use crate::cost::is_timed;
 use crate::interaction::{ContactBuffer, ContactRecord, PairScratch, Rules, Scratch, Segment};
 use crate::message::Message;
-use crate::object::{Drawing, Fault, FaultKind, Object, ObjectId};
+use crate::object::{Fault, FaultKind, Object, ObjectId};
 use crate::render::Renderer;
 use crate::simd::{Simd, prefetch};
 
@@ -242,7 +242,7 @@ impl Stages {
 
 /// Draws an object, unless it is hidden or quarantined.
 pub fn draw(object: &Object, renderer: &mut dyn Renderer) {
-    if object.quarantined().is_none() && object.drawing != Drawing::Hidden {
+    if object.is_drawn() {
         renderer.draw(object);
     }
 }

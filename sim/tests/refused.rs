@@ -9,6 +9,12 @@ use std::thread;
 use dualframe_sim::blocking::Grain;
 use dualframe_sim::executor::{Entry, ExecutorError, ExecutorKind, MAX_THREADS, Refused};
 use dualframe_sim::manager::{Settings, VeManager};
+#[cfg(unix)]
+use dualframe_sim::message::Message;
+#[cfg(unix)]
+use dualframe_sim::object::ObjectId;
+#[cfg(unix)]
+use dualframe_sim::record::{Header, Recorder};
 use dualframe_sim::render::NullRenderer;
 use dualframe_sim::scene::{ParticleScene, Scene};
 
@@ -87,7 +93,14 @@ fn without_memory_for_threads() {
 #[test]
 #[ignore = "run by another test, within limits"]
 fn without_memory_for_one_thread_more() {
-    let expected = run(scene(), SERIAL).state_hash();
+    let particles = ParticleScene { gravity: true, ..ParticleScene::new(50) };
+    let told = |settings: Settings| {
+        let scene = particles.build().expect("a valid scene");
+        let manager = VeManager::new(scene, settings).expect("as many as there were");
+        manager.mailbox().post(ObjectId(7), Message::Remove);
+        manager
+    };
+    let expected = run(told(SERIAL).into_scene(), SERIAL).state_hash();
     // Those that were joined are gone, which a pool's may be only later.
     let gate = Mutex::new(());
     let most = thread::scope(|scope| {
@@ -101,11 +114,19 @@ fn without_memory_for_one_thread_more() {
     });
     // With all that there can be in its pool, nobody is left to compute beside who renders.
     let settings = settings(ExecutorKind::RayonOverlapped, most);
-    let mut manager = VeManager::new(scene(), settings).expect("as many as there were");
+    let mut manager = told(settings);
     let ran = manager.run(FRAMES, &mut NullRenderer::new(), &mut |_| ());
     assert!(matches!(ran, Err(ExecutorError::Spawn(_))), "{most} threads: {ran:?}");
     assert!(ran.is_err_and(|error| error.can_go_on()));
-    assert_eq!(run(manager.into_scene(), SERIAL).state_hash(), expected);
+    // What came from outside has not been taken, and can be recorded.
+    let mut manager = VeManager::new(manager.into_scene(), SERIAL).expect("valid settings");
+    let recorder = Recorder::begin(Vec::new(), &Header::of(&particles), &manager);
+    let mut recorder = recorder.expect("nothing has happened");
+    let ran = recorder.run(&mut manager, FRAMES, &mut NullRenderer::new(), &mut |_| ());
+    ran.expect("it goes on");
+    assert_eq!(manager.state_hash(), expected);
+    let (_, totals) = recorder.finish(&manager).expect("there is room");
+    assert_eq!(totals.letters, 1);
 }
 
 #[cfg(unix)]

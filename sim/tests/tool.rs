@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 
 use dualframe_sim::behavior::tissue::{Material, Pin, Tissue};
-use dualframe_sim::behavior::{Bone, Fixed, Instrument, Tool, Workpieces};
+use dualframe_sim::behavior::{Bone, Felt, Fixed, Instrument, Tool, Workpieces};
 use dualframe_sim::device::DeviceSample;
 use dualframe_sim::executor::ExecutorKind;
 use dualframe_sim::geometry::Geometry;
@@ -388,4 +388,19 @@ fn a_copy_for_renderers_is_no_tool_once_it_is_of_something_else() {
     assert!(Tool::of(&copy).is_some());
     bare.snapshot_into(&mut copy);
     assert!(Tool::of(&copy).is_none());
+}
+
+#[test]
+fn what_tells_no_numbers_is_not_felt() {
+    let (patch, workpieces) = patch();
+    let mut manager = manager(patch, MIDDLE, workpieces);
+    move_to(&manager, MIDDLE, true);
+    run(&mut manager, 3);
+    move_to(&manager, MIDDLE + Vec3::Z * 0.003, true);
+    run(&mut manager, 3);
+    let felt = Felt { held: Vec3::NAN, cuts: false };
+    manager.mailbox().post(TOOL, Message::Custom(Box::new(felt)));
+    run(&mut manager, 1);
+    let held = read(&manager, TOOL, |tool| Tool::of(tool).expect("a tool").work().held);
+    assert!(held.length() > 1e-3, "{held} N");
 }

@@ -189,9 +189,11 @@ impl Tool {
         self.feed().map(Feed::stiffness)
     }
 
-    /// Adds what a body tells.
+    /// Adds what a body tells. One that is not finite tells so before it is excluded.
     pub(super) fn told(&mut self, felt: Felt) {
-        self.told.held += felt.held;
+        if felt.held.is_finite() {
+            self.told.held += felt.held;
+        }
         self.told.cuts |= felt.cuts;
     }
 
@@ -295,7 +297,7 @@ impl Tool {
         let reaction = Reaction::new(input.contacts().filter(felt), input.time_step);
         let [tissue, dura] = [None, Some(&self.workpieces.dura)].map(|only| {
             let counts = |other| !is_bone(other) && only.is_none_or(|only| only.contains(&other));
-            let contacts = input.contacts().filter(|contact| counts(contact.other));
+            let contacts = input.contacts().filter(|contact| !is_new && counts(contact.other));
             Reaction::new(contacts, input.time_step).force
         });
         if let Some(burr) = self.burr(geometry).filter(|burr| burr.spin != 0.0) {

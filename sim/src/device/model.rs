@@ -76,7 +76,7 @@ impl LocalModel {
     #[must_use]
     pub fn beside(self, other: &Self) -> Self {
         let pull = self.pull + other.force_at(self.position);
-        let pull_gradient = self.pull_gradient + other.gradient;
+        let pull_gradient = self.pull_gradient + other.gradient + other.pull_gradient;
         Self { pull, pull_gradient, time: self.time.min(other.time), ..self }
     }
 
@@ -223,6 +223,11 @@ mod tests {
             assert!(force.abs_diff_eq(Vec3::new(0.5, 0.8, 0.0), 1e-5), "{force} inside");
             let force = model.force_at(Vec3::Y * 3e-3);
             assert!(force.abs_diff_eq(Vec3::new(0.5, -0.5, 0.0), 1e-5), "{force} outside");
+        }
+        // However often something was put beside what is beside the contact.
+        let beside = wall(1_000.0).beside(&LocalModel::FREE.beside(&held));
+        for place in [Vec3::ZERO, Vec3::new(2e-3, -1e-3, 3e-3)] {
+            assert!(beside.force_at(place).abs_diff_eq(both.force_at(place), 1e-5), "{place}");
         }
         let device = SimulatedDevice::DESCRIPTION;
         let energy = |model| Bounded::new(model, &device).energy_at(Vec3::ZERO);

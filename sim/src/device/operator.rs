@@ -17,7 +17,7 @@ const LONGEST_STEP: f64 = 20e-6;
 pub struct Hand {
     /// What of the hand moves with the device, in kilograms. Usually 0 to 0.15.
     pub mass: f64,
-    /// In newton seconds per metre. Usually 0.5 (a light grip) to 5.
+    /// In newton seconds per metre, besides the device's own 0.5. Usually 0 (a light grip) to 5.
     pub damping: f64,
     /// In newtons per metre. Usually 50 (a light grip) to 500.
     pub stiffness: f64,

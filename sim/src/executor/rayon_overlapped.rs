@@ -73,10 +73,13 @@ impl Executor for RayonOverlappedExecutor {
             give_back(&used, picture);
         }
         let outside = Arc::clone(&self.engine.world.outside);
-        outside.begin(self.engine.frame);
         let (engine, loops) = (&mut self.engine, &self.loops);
         let unused = thread::scope(|scope| {
-            let work = move || loops.enter(|| compute(engine, loops, frames, unused, &taken_in));
+            let work = move || {
+                // Not where there is no thread: what came from outside is taken, and recorded, with this.
+                engine.world.outside.begin(engine.frame);
+                loops.enter(|| compute(engine, loops, frames, unused, &taken_in))
+            };
             let computing =
                 Builder::new().spawn_scoped(scope, work).map_err(ExecutorError::Spawn)?;
             // Both ends are dropped if the renderer panics, so that nobody waits for it then.

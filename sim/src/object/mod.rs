@@ -127,6 +127,12 @@ impl Object {
         self.quarantined
     }
 
+    /// Whether it is to be drawn: it is neither hidden nor excluded.
+    #[must_use]
+    pub fn is_drawn(&self) -> bool {
+        self.quarantined.is_none() && self.drawing != Drawing::Hidden
+    }
+
     /// The box around it after its last update; empty for an excluded object.
     #[must_use]
     pub fn bounds(&self) -> Bounds {

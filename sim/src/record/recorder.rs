@@ -70,12 +70,13 @@ impl<W: Write> Recorder<W> {
         if bytes.len() > MAX_PAYLOAD {
             return Err(RecordError::Full { frame });
         }
-        let mut writer = ChunkWriter::new(write)?;
-        writer.write(Kind::Header, &bytes)?;
         let journal = Arc::new(Mutex::new(Journal::new()));
+        // Nothing is written where another recorder may be writing.
         if !manager.mailbox().record(&journal) {
             return Err(RecordError::Recorded);
         }
+        let mut writer = ChunkWriter::new(write)?;
+        writer.write(Kind::Header, &bytes)?;
         let written = Instant::now();
         let mut recorder = Self { writer, journal, written, hashes: Vec::new(), checked: None };
         recorder.checkpoint(manager)?;
@@ -88,8 +89,10 @@ impl<W: Write> Recorder<W> {
     ///
     /// # Errors
     /// The executor cannot go on, or what was recorded cannot be written, or frames were run without the recorder, so
-    /// that the last checkpoint is more than [`CHECKPOINT_FRAMES`] ago. Frames may be left to do then:
-    /// [`VeManager::frame`] says how far it came.
+    /// that the last checkpoint is more than [`CHECKPOINT_FRAMES`] ago; or what came from outside between two checkpoints
+    /// takes more than a chunk's 16 MiB, some 900,000 impulses: a host that posts so much had better run fewer frames at
+    /// a time, after which what is recorded is written. Frames may be left to do then: [`VeManager::frame`] says how far
+    /// it came.
     ///
     /// # Panics
     /// As [`VeManager::run`]; nothing is recorded any more then.

@@ -277,7 +277,10 @@ fn what_a_recorder_cannot_hold() {
     let manager = manager(scene().build().expect("a valid scene"));
     let begin = || Recorder::begin(Vec::new(), &Header::of(&scene()), &manager);
     let mut recorder = begin().expect("it can be recorded");
-    assert!(matches!(begin(), Err(RecordError::Recorded)));
+    let mut written = Vec::new();
+    let refused = Recorder::begin(&mut written, &Header::of(&scene()), &manager);
+    assert!(matches!(refused, Err(RecordError::Recorded)));
+    assert!(written.is_empty(), "it may be the other's file");
     let spec = vec![1; MAX_PAYLOAD];
     let refused = recorder.objects(&manager, &spec);
     assert!(matches!(refused, Err(RecordError::Disorder(Disorder::Stops { frame: 0 }))));

@@ -160,3 +160,30 @@ fn is_drilled_like_any_bone() {
     let expected = mass * left as f32 / whole as f32;
     assert!((lighter / expected - 1.0).abs() < 1e-4, "{lighter} kg, not {expected}");
 }
+
+#[test]
+fn what_is_drilled_away_is_held_by_nobody() {
+    let mut executor = scene(flap(Pose::IDENTITY), false, vec![], 0.0);
+    let center = center(&executor);
+    post(
+        &executor,
+        Grasp { by: TOOL, point: center, radius: 3e-3, stiffness: 1e3, strength: 20.0 },
+    );
+    run(&mut executor, 1);
+    assert_eq!(look(&executor, |piece, _| piece.holders().count()), 1);
+    let burr = Burr {
+        bit: Bit { radius: 0.1, ..Bit::BURR },
+        center,
+        axis: Vec3::Z,
+        spin: 3e3,
+        side: None,
+    };
+    let mut frames = 0;
+    while look(&executor, |piece, _| piece.body().mass) > 0.0 {
+        post(&executor, Erode { burr, load: 1e6 });
+        run(&mut executor, 1);
+        frames += 1;
+        assert!(frames < 1_000, "it is still there");
+    }
+    assert_eq!(look(&executor, |piece, _| piece.holders().count()), 0);
+}

@@ -12,7 +12,7 @@ use crate::geometry::Volume;
 const LEAST_DEPTH: f32 = 1e-6;
 
 /// The shares of the greatest |M1| that a half-space can give between which the volume takes over from |M1|;
-/// usually 0.8 to 0.95, depths of 0.75 to 0.87 radii.
+/// usually 0.8 to 0.95, depths of 0.67 to 0.84 radii.
 const NEARLY_HALF: [f64; 2] = [0.8, 0.95];
 
 /// What one of a bit's balls overlaps of a volume, by integrals of the density ρ (0 to 1) over the ball.

@@ -148,6 +148,10 @@ impl Behavior for Piece {
         let time = input.time_step;
         if self.erosions.apply(volume, input.frame, time) > 0 {
             self.body.weigh(volume);
+            if self.body.mass == 0.0 {
+                // Nothing is left to hold.
+                self.hands = Hands::default();
+            }
         }
         let was_seated = self.seated;
         if self.seated {

@@ -194,6 +194,8 @@ impl Executor for PipelineExecutor {
         if let Some(full) = self.failure {
             return Err(full.into());
         }
+        // What came from outside is taken, and recorded, with the first frame: not where there will be none.
+        self.team.grow(self.pool.threads())?;
         self.outside.begin(self.frame);
         while self.frame < end {
             if self.layout.blocks.is_empty() {
