@@ -9,8 +9,9 @@ pub enum Coloring {
     /// The object's own colour.
     #[default]
     Object,
-    /// How far each node's springs are stretched (red at 20 %) or pressed (blue at −20 %), from their length at
-    /// rest (grey). Bodies without springs keep their own colour.
+    /// How far the springs along the sides of each node's triangles are stretched (red at 20 %) or pressed (blue at
+    /// −20 %), from their length at rest (grey); where a surface ends, one of the two along its border. Bodies without
+    /// springs keep their own colour.
     Strain,
     /// How fast each node is, or a rigid shape as a whole: from nearly black at rest over red and yellow to white at
     /// 3 m/s.

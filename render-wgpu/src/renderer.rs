@@ -100,7 +100,8 @@ impl Painter {
         self.units.queue()
     }
 
-    /// Draws at another size from the next frame on.
+    /// Draws at another size from the next frame on. Between two frames: one that was begun, by [`Painter::add`], has the
+    /// size that it began with.
     ///
     /// # Errors
     /// No pixels, or more than the adapter allows.
@@ -131,8 +132,14 @@ impl Painter {
     }
 
     /// Takes an object of this frame, unless neither it nor its shadow is in the picture. The springs of
-    /// a [`GpuMassSpring`] are integrated in any case.
+    /// a [`GpuMassSpring`] are integrated in any case. What is hidden or excluded is no part of a frame: a host that
+    /// visits objects by itself may leave that to this, as executors leave it to [`stages::draw`].
+    ///
+    /// [`stages::draw`]: dualframe_sim::stages::draw
     pub fn add(&mut self, object: &Object) {
+        if !object.is_drawn() {
+            return;
+        }
         let size = self.size();
         if self.view.is_none() && self.failure.is_none() {
             // Asked once a frame: the device's own note is behind a lock.
@@ -168,15 +175,25 @@ impl Painter {
         }
     }
 
-    /// Ends the frame without a picture.
+    /// Ends the frame without a picture. Units of GPU work that wait for one go on waiting.
     pub fn discard(&mut self) {
-        self.view = None;
+        if let Some(failure) = self.failure() {
+            return self.fail(failure);
+        }
         // What was written to the device waits in memory of its own until something is submitted.
         self.gpu.queue.submit([]);
+        let Some(view) = self.view.take() else { return };
+        let size = self.size();
+        let Self { gpu, surfaces, picker, integrator, units, .. } = self;
+        let view = &view;
+        let context = Context { gpu, size, picture: None, view, surfaces, picker, integrator };
+        units.finish(&context);
     }
 
     /// Ends the frame: encodes how `picture`, a view of a texture of this size and format, is made of
-    /// what was taken. Once the device has failed there is nothing to encode, and units of GPU work end with that.
+    /// what was taken. The encoder is to be submitted before the next frame's first object is taken: what a frame draws
+    /// lies in memory that the next one's takes. Once the device has failed there is nothing to encode, and units of GPU
+    /// work end with that.
     pub fn paint(&mut self, encoder: &mut CommandEncoder, picture: &TextureView) {
         if let Some(failure) = self.failure() {
             return self.fail(failure);

@@ -14,7 +14,8 @@ use dualframe_sim::render::Renderer;
 use dualframe_sim::scene::ParticleScene;
 use glam::{Vec2, Vec3};
 use parry3d::math::Pose;
-use parry3d::shape::SharedShape;
+use parry3d::shape::{HeightField, HeightFieldCellStatus, SharedShape};
+use parry3d::utils::Array2;
 use wgpu::PollType;
 
 const SIZE: (u32, u32) = (320, 240);
@@ -57,6 +58,47 @@ fn frames_that_are_not_drawn_leave_nothing() {
     };
     let (few, many) = (after(10), after(100));
     assert!(many <= few, "{few} bytes, then {many}");
+}
+
+#[test]
+#[ignore = "needs a graphics adapter; .ci/run has one"]
+fn shapes_that_nobody_has_any_more_leave_nothing() {
+    let mut offscreen = offscreen();
+    let mut after = |frames: usize| {
+        for _ in 0..frames {
+            // Another shape each time.
+            offscreen.draw(&ball(0, Vec3::ZERO));
+            offscreen.swap(0);
+        }
+        in_use(&offscreen)
+    };
+    let (few, many) = (after(10), after(100));
+    // Less than one ball takes; some bytes more are the allocator's.
+    assert!(many < few + 10_000, "{few} bytes, then {many}");
+}
+
+#[test]
+#[ignore = "needs a graphics adapter; .ci/run has one"]
+fn what_is_hidden_or_has_no_surface_is_not_in_a_picture() {
+    let mut offscreen = offscreen();
+    offscreen.painter.look.room = false;
+    let mut with = |object: &Object| {
+        offscreen.painter.add(object);
+        offscreen.swap(0);
+        assert!(offscreen.painter.failure().is_none());
+        offscreen.picture().expect("the device works").pixels
+    };
+    let mut hidden = ball(0, Vec3::ZERO);
+    hidden.drawing = Drawing::Hidden;
+    let mut field = HeightField::new(Array2::repeat(3, 3, 0.0), Vec3::ONE);
+    for cell in [[0, 0], [0, 1], [1, 0], [1, 1]] {
+        field.set_cell_status(cell[0], cell[1], HeightFieldCellStatus::CELL_REMOVED);
+    }
+    let rigid = Rigid::new(SharedShape::new(field), Pose::IDENTITY);
+    let removed = Object::new(ObjectId(0), Group(0), Geometry::Rigid(rigid), Fixed);
+    let nothing = with(&hidden);
+    assert!(with(&ball(0, Vec3::ZERO)) != nothing, "a ball is to be seen");
+    assert!(with(&removed) == nothing, "no cell is left");
 }
 
 #[test]

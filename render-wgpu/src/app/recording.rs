@@ -50,7 +50,7 @@ impl<'a> Recording<'a> {
                 Err(RecordError::Executor(error)) => {
                     if !error.can_go_on() {
                         // The state depends on the schedule now: nothing may be recorded of it.
-                        self.recorder = None;
+                        self.fail(RecordError::Over, manager);
                     }
                     return Err(error);
                 }

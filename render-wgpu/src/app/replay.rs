@@ -13,7 +13,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::args::ReplayArgs;
+use super::args::{ReplayArgs, frames_in_flight};
 use super::error::RunError;
 use super::outputs::{self, Output};
 use super::scenes::{AnyScene, AnySceneError};
@@ -183,7 +183,7 @@ fn report(
         executor: settings.executor.name(),
         threads: settings.threads,
         simd: args.way.simd().instructions().name(),
-        frames_in_flight: args.way.frames_in_flight,
+        frames_in_flight: frames_in_flight(&settings),
         frames,
         checkpoints: replay.checkpoints(),
         messages: replay.letters(),

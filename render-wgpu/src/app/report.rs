@@ -2,13 +2,14 @@
 
 use std::io::Write;
 
-use dualframe_sim::executor::{Entry, StageSeconds};
+use dualframe_sim::executor::StageSeconds;
 use dualframe_sim::manager::{Settings, VeManager};
 use dualframe_sim::object::{Drawing, Fault, FaultKind, ObjectId};
 use dualframe_sim::scene::craniotomy;
 use dualframe_sim::simd::Simd;
 use serde::{Serialize, Serializer};
 
+use super::args::frames_in_flight;
 use super::error::RunError;
 use super::haptics::HapticsReport;
 use super::manage::Spent;
@@ -190,7 +191,7 @@ impl Report {
         });
         let seconds = measure.seconds();
         // A window may have changed them.
-        let Settings { executor, threads, entry, .. } = manager.settings();
+        let Settings { executor, threads, .. } = manager.settings();
         let quarantined = manager.quarantined();
         let non_finite =
             quarantined.iter().filter(|(_, fault)| fault.kind == FaultKind::NonFinite).count();
@@ -205,7 +206,7 @@ impl Report {
             frames: measure.frames,
             seed: 0,
             gravity: true,
-            frames_in_flight: if entry == Entry::AfterSwap { 1 } else { 2 },
+            frames_in_flight: frames_in_flight(&manager.settings()),
             seconds,
             fps: measure.frames as f64 / seconds.max(f64::MIN_POSITIVE),
             speed_up: None,

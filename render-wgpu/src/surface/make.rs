@@ -78,7 +78,10 @@ impl Make {
 
     /// Whether no body can be of this make any more.
     pub(super) fn is_gone(&self) -> bool {
-        matches!(&self.likeness, Likeness::Deformable(topology) if Arc::strong_count(topology) == 1)
+        match &self.likeness {
+            Likeness::Deformable(topology) => Arc::strong_count(topology) == 1,
+            Likeness::Rigid(shape) => Arc::strong_count(&shape.0) == 1,
+        }
     }
 
     pub(super) fn deformable(gpu: &Gpu, layouts: &Layouts, topology: &Arc<Topology>) -> Self {
@@ -178,7 +181,7 @@ fn ordered([a, b]: [u32; 2]) -> [u32; 2] {
 /// The surface of a rigid shape: nothing for what has none or no bounds, for single segments and triangles, and for
 /// shapes of others' making. Rounded shapes are drawn without their rounding, as far within.
 fn outline(shape: &SharedShape) -> Option<(Vec<Vec3>, Vec<[u32; 3]>)> {
-    match shape.as_typed_shape() {
+    let outline = match shape.as_typed_shape() {
         TypedShape::Ball(shape) => Some(shape.to_trimesh(ROUND_SIDES, ROUND_SIDES / 2)),
         TypedShape::Cuboid(shape) => Some(faceted(shape.to_trimesh())),
         TypedShape::Capsule(shape) => Some(shape.to_trimesh(ROUND_SIDES, ROUND_SIDES / 4)),
@@ -194,13 +197,15 @@ fn outline(shape: &SharedShape) -> Option<(Vec<Vec3>, Vec<[u32; 3]>)> {
         TypedShape::HeightField(shape) => Some(shape.to_trimesh()),
         TypedShape::Voxels(shape) => Some(faceted(shape.to_trimesh())),
         TypedShape::TriMesh(shape) => Some((shape.vertices().to_vec(), shape.indices().to_vec())),
-        TypedShape::Compound(shape) => together(shape),
+        TypedShape::Compound(shape) => Some(together(shape)),
         _ => None,
-    }
+    };
+    // Of a field of heights all cells may have been removed.
+    outline.filter(|(_, triangles)| !triangles.is_empty())
 }
 
-/// The surfaces of those of a compound's parts that have one, if any has.
-fn together(compound: &Compound) -> Option<(Vec<Vec3>, Vec<[u32; 3]>)> {
+/// The surfaces of those of a compound's parts that have one.
+fn together(compound: &Compound) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let (mut nodes, mut triangles) = (Vec::new(), Vec::new());
     for (pose, part) in compound.shapes() {
         let Some((own, of_own)) = outline(part) else { continue };
@@ -208,7 +213,7 @@ fn together(compound: &Compound) -> Option<(Vec<Vec3>, Vec<[u32; 3]>)> {
         nodes.extend(own.into_iter().map(|node| pose.transform_point(node)));
         triangles.extend(of_own.into_iter().map(|triangle| triangle.map(|node| first + node)));
     }
-    (!triangles.is_empty()).then_some((nodes, triangles))
+    (nodes, triangles)
 }
 
 /// Gives every triangle nodes of its own, so that its edges look sharp.

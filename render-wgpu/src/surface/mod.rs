@@ -31,8 +31,8 @@ use crate::gpu::Gpu;
 use crate::look::Coloring;
 use crate::target::Format;
 
-/// Frames after which what is no longer drawn is forgotten. Of a surface that is cut, which gets a new make with every
-/// cut, the old one is at once.
+/// Frames after which what is no longer drawn is forgotten. What nobody else has any more, as of a surface that gets a
+/// new make with every cut the old one, is at once.
 pub(crate) const KEPT_FRAMES: u64 = 600;
 
 /// What a body does as a whole: how it is turned, where it is and how fast it goes.
@@ -79,7 +79,8 @@ impl Surfaces {
         }
         let oldest = self.frame.saturating_sub(KEPT_FRAMES);
         let is_kept = |make: &Make| make.used >= oldest && !make.is_gone();
-        if !self.makes.iter().all(is_kept) {
+        let is_known = |shape: &SharedShape| Arc::strong_count(&shape.0) > 1;
+        if !self.makes.iter().all(is_kept) || !self.without_surface.iter().all(is_known) {
             self.makes.retain(is_kept);
             // Found again at their next drawing.
             self.by_address.clear();
@@ -169,7 +170,8 @@ impl Surfaces {
         make.used = self.frame;
         match object.drawing {
             Drawing::Edges => make.wires.push(instance),
-            Drawing::Surface | Drawing::Hidden => make.surfaces.push(instance),
+            Drawing::Surface => make.surfaces.push(instance),
+            Drawing::Hidden => {}
         }
     }
 

@@ -72,6 +72,8 @@ fn every_executor_says_the_same() {
         let args = ["--objects", "30", "--frames", "40", "--threads", "2", "--executor", executor];
         let report = report(&args);
         assert_eq!(report["executor"], executor);
+        let overlaps = ["pipeline", "rayon-overlapped"].contains(&executor);
+        assert_eq!(report["frames_in_flight"], if overlaps { 2 } else { 1 }, "{executor}");
         report["state_hash"].as_str().map(str::to_owned)
     };
     let first = hash("pipeline");

@@ -173,6 +173,16 @@ pub(in crate::app) fn entry(frames_in_flight: u8) -> Entry {
     if frames_in_flight == 1 { Entry::AfterSwap } else { Entry::AfterUpdate }
 }
 
+/// How many frames are in flight at once: what the pipeline lets enter says so, and only one other renders a frame
+/// beside the next.
+pub(in crate::app) fn frames_in_flight(settings: &Settings) -> u8 {
+    match settings.executor {
+        ExecutorKind::Pipeline if settings.entry != Entry::AfterSwap => 2,
+        ExecutorKind::RayonOverlapped => 2,
+        _ => 1,
+    }
+}
+
 /// Arguments of a replay.
 #[derive(Args)]
 #[command(
@@ -275,8 +285,8 @@ pub(in crate::app) struct CraniotomyArgs {
     #[arg(long, conflicts_with = "window")]
     pub(in crate::app) simulated_devices: bool,
     #[arg(long, value_name = "HZ", default_value_t = RATE, value_parser = parse_rate,
-          help = format!("How often a second the hands' haptic loops tick, {MIN_RATE} to {MAX_RATE}; simulated \
-                          devices take 500 and more"))]
+          help = format!("How often a second the hands' haptic loops tick, in a window or with \
+                          --simulated-devices, {MIN_RATE} to {MAX_RATE}; simulated devices take 500 and more"))]
     pub(in crate::app) haptic_rate: f64,
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_FRAMES),
           help = format!("Number of frames, 1 to {MAX_FRAMES}; if not given, the operation's own, or in a \
