@@ -32,7 +32,8 @@ use crate::error::GraphicsError;
 ///
 /// What the device did not integrate, the next update does by the processor, as [`Springs::advance`]:
 /// if the object was not drawn, or only a copy of it was (as by [`RayonOverlappedExecutor`]), if somebody
-/// changed the mesh in between, or if the device fails. The device adds up in another order and may
+/// changed the mesh's numbers in between, or if the device fails. If the mesh has another topology by then, as a cut one
+/// has, what was left of its last frame is dropped. The device adds up in another order and may
 /// divide less exactly: in 240 frames of vibration, falling and contacts a particle's nodes stay within
 /// 10 µm of the processor's. Results are the same for any number of threads as long as the device is the
 /// same, its driver too, and whoever renders gives a [`Painter`] every frame.
@@ -44,7 +45,8 @@ use crate::error::GraphicsError;
 /// [`Settings`]: dualframe_sim::manager::Settings
 /// [`Difference`]: dualframe_sim::record::Difference
 ///
-/// One workgroup of 256 invocations integrates a body, whatever its size; different bodies at once.
+/// One workgroup of 256 invocations integrates a body, whatever its size; different bodies at once, up to 256 that were
+/// updated before the first of them is drawn: for each one more, whoever draws it waits for the device.
 ///
 /// [`RayonOverlappedExecutor`]: dualframe_sim::executor::RayonOverlappedExecutor
 pub struct GpuMassSpring {
