@@ -100,8 +100,8 @@ impl Painter {
         self.units.queue()
     }
 
-    /// Draws at another size from the next frame on. Between two frames: one that was begun, by [`Painter::add`], has the
-    /// size that it began with.
+    /// Draws at another size from the next frame on. To be called between two frames: one that was begun, by
+    /// [`Painter::add`], is still seen at the old size, and would be painted at the new one.
     ///
     /// # Errors
     /// No pixels, or more than the adapter allows.
