@@ -17,6 +17,11 @@ use crate::executor::MAX_THREADS;
 /// costs to put a thread to sleep and to wake it again.
 const SPIN: Duration = Duration::from_micros(50);
 
+/// How long a worker looks for the next batch of a run before it sleeps. Usually 2 ms: longer than it takes to form the
+/// blocks of thousands of objects anew, for who sleeps then is woken by the thread that has formed them, one after the
+/// other, while all others wait.
+const SPIN_BETWEEN: Duration = Duration::from_millis(2);
+
 /// The number of cores that this process may use, as the system counts them: each hardware thread is one.
 #[must_use]
 pub fn cores() -> usize {
@@ -70,13 +75,17 @@ impl Pool {
 
     /// Looks for a cause to stop waiting, as long as that is cheaper than to sleep. `false` if
     /// there was none.
-    pub(crate) fn spin(&self, has_cause: impl Fn() -> bool) -> bool {
+    pub(crate) fn spin(&self, has_cause: impl FnMut() -> bool) -> bool {
+        self.spin_for(SPIN, has_cause)
+    }
+
+    fn spin_for(&self, time: Duration, mut has_cause: impl FnMut() -> bool) -> bool {
         // With fewer cores than threads looking takes the core from somebody who works.
         if self.threads() > self.cores {
             return false;
         }
         let began = Instant::now();
-        while began.elapsed() < SPIN {
+        while began.elapsed() < time {
             if has_cause() {
                 return true;
             }
@@ -113,6 +122,8 @@ struct Phase {
     run: usize,
     /// Threads that have reported for work.
     present: usize,
+    /// Threads that sleep until any of this changes.
+    asleep: usize,
     closed: bool,
 }
 
@@ -136,17 +147,35 @@ impl Crew {
         phase.run += 1;
         // Release: with the Acquire in `await_run`; the pipeline itself is behind its own lock.
         self.run.store(phase.run, Ordering::Release);
+        self.announce(phase);
+    }
+
+    /// Wakes whoever sleeps until something changes, which it has.
+    fn announce(&self, phase: MutexGuard<'_, Phase>) {
+        let asleep = phase.asleep;
         drop(phase);
-        self.changed.notify_all();
+        if asleep > 0 {
+            self.changed.notify_all();
+        }
+    }
+
+    /// Sleeps until something changes.
+    fn sleep_on<'p>(&self, mut phase: MutexGuard<'p, Phase>) -> MutexGuard<'p, Phase> {
+        phase.asleep += 1;
+        phase = self.changed.wait(phase).unwrap_or_else(PoisonError::into_inner);
+        phase.asleep -= 1;
+        phase
     }
 
     /// Waits until a run after number `last` starts and returns its number; `None` to leave.
     pub(crate) fn await_run(&self, last: usize, pool: &Pool, index: usize) -> Option<usize> {
         let wanted = || index < pool.threads();
-        let started = || self.run.load(Ordering::Acquire) != last;
+        let run = || self.run.load(Ordering::Acquire);
         // Acquire: with the Release in `close`; nothing else is read by it.
         let closed = || self.closed.load(Ordering::Acquire);
-        pool.spin(|| started() && wanted() || closed());
+        if pool.spin_for(SPIN_BETWEEN, || run() != last && wanted() || closed()) {
+            return (!closed()).then(run);
+        }
         let mut phase = lock(&self.phase);
         loop {
             if phase.closed {
@@ -155,7 +184,7 @@ impl Crew {
             if phase.run != last && wanted() {
                 return Some(phase.run);
             }
-            phase = self.changed.wait(phase).unwrap_or_else(PoisonError::into_inner);
+            phase = self.sleep_on(phase);
         }
     }
 
@@ -165,8 +194,7 @@ impl Crew {
         phase.present += 1;
         // Release: with the Acquire in `await_present`, which need not see more than the number.
         self.present.store(phase.present, Ordering::Release);
-        drop(phase);
-        self.changed.notify_all();
+        self.announce(phase);
     }
 
     /// Waits until so many hired threads are ready.
@@ -176,7 +204,7 @@ impl Crew {
         }
         let mut phase = lock(&self.phase);
         while phase.present < hired {
-            phase = self.changed.wait(phase).unwrap_or_else(PoisonError::into_inner);
+            phase = self.sleep_on(phase);
         }
     }
 
@@ -190,9 +218,10 @@ impl Crew {
 
     /// Sends everybody home.
     pub(crate) fn close(&self) {
-        lock(&self.phase).closed = true;
+        let mut phase = lock(&self.phase);
+        phase.closed = true;
         self.closed.store(true, Ordering::Release);
-        self.changed.notify_all();
+        self.announce(phase);
     }
 
     /// Waits until everybody who was sent home has gone, unless that takes so long that the caller had

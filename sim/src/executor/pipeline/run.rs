@@ -2,7 +2,7 @@
 
 use std::mem;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard};
+use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::thread;
 
 use dualframe_core::error::{Table, TableFull};
@@ -192,7 +192,7 @@ impl<'s> Context<'s, '_> {
             }
             let frame = self.shared.first_frame + done;
             let batch = (FRAMES_PER_BLOCKING - frame % FRAMES_PER_BLOCKING).min(frames - done);
-            let Ok(mut resting) = pipeline.write() else { break };
+            let Some(mut resting) = self.write(pipeline) else { break };
             let rendering = kept.as_ref().map_or(Cost::default(), |screen| *screen.rendering);
             if let Err(pairs) =
                 regrouping.regroup_before(frame, self.shared, &mut resting, rendering)
@@ -207,7 +207,7 @@ impl<'s> Context<'s, '_> {
             self.crew.start();
             kept = self.lead(&read(pipeline), &host, kept);
             done += batch;
-            let Ok(mut rested) = pipeline.write() else { break };
+            let Some(mut rested) = self.write(pipeline) else { break };
             end = regrouping.outgrown(self.shared, &mut rested);
             if end != End::Done {
                 break;
@@ -217,6 +217,17 @@ impl<'s> Context<'s, '_> {
         drop(dismissal);
         self.crew.see_off(self.pool);
         end
+    }
+
+    /// Waits until all others have left the batch; nothing if one of them panicked in it.
+    fn write<'l, T>(self, lock: &'l RwLock<T>) -> Option<RwLockWriteGuard<'l, T>> {
+        // They are about to: to sleep until they have would take longer.
+        let mut guard = None;
+        self.pool.spin(|| {
+            guard = lock.try_write().ok();
+            guard.is_some() || lock.is_poisoned()
+        });
+        guard.or_else(|| lock.write().ok())
     }
 
     /// The calling thread's part in a batch; it alone renders if it has kept the screen.
