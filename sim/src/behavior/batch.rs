@@ -14,16 +14,23 @@ use crate::geometry::{Extent, Mesh};
 use crate::object::{Object, ObjectId};
 use crate::simd::{HALF, Simd};
 
-/// The bodies that must move on average for a step side by side to cost less than their steps one by
-/// one; usually 4.
-const WORTH: u64 = 4;
-
 /// The most nodes of a body that is advanced together with others; usually 1,024, with which sixteen
 /// bodies fit a second-level cache of 1 MB, or half as many in twice as many lanes.
 const MOST_NODES: usize = 1_024;
 
-/// What a step in all lanes costs, if a register holds them, over one in half of them, as a fraction; usually 5/4.
-const WIDE_STEP: [u64; 2] = [5, 4];
+/// What a body costs by itself before its first substep, in its substeps; usually 3.4.
+const ALONE: f32 = 3.4;
+/// What up to [`HALF`] bodies side by side cost before their first substep, likewise; usually 16.
+const TURN: f32 = 16.0;
+/// What a substep of theirs costs, likewise; usually 4.8.
+const STEP: f32 = 4.8;
+/// How many times as much a turn and a substep cost in twice as many lanes, where a register holds them; usually 1.5: 1.2
+/// where such registers are computed with as fast as with shorter ones, up to 1.9 elsewhere.
+const WIDE: f32 = 1.5;
+/// What a body costs where all lanes are full, before its first substep and for each, likewise; usually 2.9 and 0.48.
+const FULL: [f32; 2] = [2.9, 0.48];
+/// The fewest bodies that may be better off side by side than one by one, by what they cost; usually 5.
+const FEWEST: usize = 5;
 
 /// Whether a body of so many nodes may be advanced together with others.
 pub(super) fn may_be_abreast(nodes: usize) -> bool {
@@ -107,38 +114,58 @@ pub(crate) fn advance(objects: &mut [Object], work: &mut SpringWork, frame: u64,
 }
 
 /// How many of the first bodies are best advanced together, and in how many lanes, of which there are at most
-/// `width`.
+/// `width`: those that cost least of what they would in full lanes.
 fn together(bodies: &[Waiting], width: usize) -> (usize, usize) {
-    let half = Filling::of(bodies, HALF);
-    let [cost, cost_of_half] = WIDE_STEP;
-    if width > HALF {
-        let all = Filling::of(bodies, width);
-        if all.substeps * half.steps * cost_of_half > half.substeps * all.steps * cost {
-            return (all.bodies, width);
+    if bodies.len() < FEWEST {
+        return (1, HALF);
+    }
+    // Nothing is cheaper than full lanes.
+    if bodies.len() >= 2 * width {
+        return (2 * width, width);
+    }
+    let mut best = Filling::alone(bodies);
+    for (most, lanes) in [(HALF, HALF), (2 * HALF, HALF), (width, width), (2 * width, width)] {
+        let filling = Filling::of(&bodies[..bodies.len().min(most)], lanes);
+        if filling.price < best.price {
+            best = filling;
         }
     }
-    if half.substeps >= WORTH * half.steps { (half.bodies, HALF) } else { (1, HALF) }
+    (best.bodies, best.lanes)
 }
 
-/// What is done if as many bodies as there is room for are advanced together.
+/// What is done if so many bodies are advanced next.
 struct Filling {
     bodies: usize,
-    /// Of all of them.
-    substeps: u64,
-    /// As many as the longest lane has substeps.
-    steps: u64,
+    lanes: usize,
+    /// What they cost, over what they would in full lanes.
+    price: f32,
 }
 
 impl Filling {
+    fn new(bodies: &[Waiting], lanes: usize, cost: f32) -> Self {
+        let [body, substep] = FULL;
+        let substeps: u64 = bodies.iter().map(|body| u64::from(body.springs.substeps)).sum();
+        let full = body * bodies.len() as f32 + substep * substeps as f32;
+        Self { bodies: bodies.len(), lanes, price: cost / full }
+    }
+
+    /// The first of these, by itself.
+    fn alone(bodies: &[Waiting]) -> Self {
+        Self::new(&bodies[..1], HALF, ALONE + bodies[0].springs.substeps as f32)
+    }
+
+    /// All of these, two at most for each of so many lanes.
     fn of(bodies: &[Waiting], lanes: usize) -> Self {
-        let bodies = &bodies[..bodies.len().min(2 * lanes)];
         let mut substeps = [0; WIDEST];
         for (index, body) in bodies.iter().enumerate() {
             let (_, lane) = seat(index, lanes);
             substeps[lane] += u64::from(body.springs.substeps);
         }
+        // As many as the longest lane has.
         let steps = substeps.into_iter().max().unwrap_or(0);
-        Self { bodies: bodies.len(), substeps: substeps.into_iter().sum(), steps }
+        let turns = bodies.len().div_ceil(lanes);
+        let width = if lanes > HALF { WIDE } else { 1.0 };
+        Self::new(bodies, lanes, width * (TURN * turns as f32 + STEP * steps as f32))
     }
 }
 
@@ -186,6 +213,37 @@ mod tests {
     use crate::executor::{Executor, SerialExecutor};
     use crate::render::NullRenderer;
     use crate::scene::ParticleScene;
+
+    /// How many bodies that wait with these substeps are advanced first, and in how many lanes of 16.
+    fn first_of(substeps: impl IntoIterator<Item = u32>) -> (usize, usize) {
+        let springs = Springs {
+            damping: 0.0,
+            stiffness: 1.0,
+            center_stiffness: 1.0,
+            gravity: [0.0; 3],
+            time: 0.01,
+            substeps: 1,
+        };
+        let body =
+            |substeps| Waiting { place: 0, topology: 0, springs: Springs { substeps, ..springs } };
+        together(&substeps.into_iter().map(body).collect::<Vec<_>>(), 2 * HALF)
+    }
+
+    #[test]
+    fn as_many_are_side_by_side_as_are_cheapest() {
+        // From 10 to 1, as particles have.
+        let mixed = |count: u32| (0..count).map(move |body| 10 - 10 * body / count);
+        assert_eq!(first_of(mixed(4)), (1, HALF));
+        assert_eq!(first_of(mixed(16)), (16, HALF));
+        assert_eq!(first_of(mixed(18)), (16, HALF), "two are cheaper by themselves than a turn");
+        assert_eq!(first_of(mixed(30)), (30, 2 * HALF));
+        assert_eq!(first_of(mixed(100)), (32, 2 * HALF));
+        assert_eq!(first_of([8; 16]), (16, 2 * HALF));
+        assert_eq!(first_of([8; 18]), (16, 2 * HALF));
+        assert_eq!(first_of([8; 7]), (7, HALF));
+        let one_long = std::iter::once(1_000).chain([1; 15]);
+        assert_eq!(first_of(one_long), (1, HALF));
+    }
 
     #[test]
     fn bodies_side_by_side_are_measured_as_one_by_itself() {
