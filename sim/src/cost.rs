@@ -2,16 +2,48 @@
 
 use std::time::Duration;
 
-/// Of so many frames one is timed; usually 16.
-const FRAMES_PER_TIMING: u64 = 16;
+/// Of so many frames one is timed; usually 4.
+const FRAMES_PER_TIMING: u64 = 4;
+/// What was timed in so many frames is noted as one; usually 32: those between two times that blocks are formed anew.
+pub(crate) const FRAMES_PER_NOTE: u64 = 32;
+/// The frames of these that are timed: all but the first, for which little is in the caches.
+const TIMINGS: usize = (FRAMES_PER_NOTE / FRAMES_PER_TIMING) as usize - 1;
 
-/// Whether updates and renderings are timed in a frame: never in the first ones after blocks were formed anew, for
-/// which little is in the caches.
+/// Whether updates and renderings are timed in a frame.
 pub(crate) fn is_timed(frame: u64) -> bool {
-    frame % FRAMES_PER_TIMING == FRAMES_PER_TIMING / 2
+    frame.is_multiple_of(FRAMES_PER_TIMING) && !frame.is_multiple_of(FRAMES_PER_NOTE)
 }
 
-/// The mean of what was timed, of which the last counts half, the one before a quarter and so on.
+/// Whether what was timed is noted in a frame, the last of so many that is timed.
+fn is_noted(frame: u64) -> bool {
+    frame % FRAMES_PER_NOTE == FRAMES_PER_NOTE - FRAMES_PER_TIMING
+}
+
+/// What something took in each frame that was timed since it was last noted.
+#[derive(Debug, Default)]
+pub(crate) struct Timings {
+    took: [Duration; TIMINGS],
+    count: usize,
+}
+
+impl Timings {
+    /// Adds what it took in `frame`, and says what is to be noted in that: the median, which a core that does something
+    /// else now and then, or is lent to somebody else, changes little.
+    pub(crate) fn add(&mut self, frame: u64, took: Duration) -> Option<Duration> {
+        if let Some(free) = self.took.get_mut(self.count) {
+            *free = took;
+            self.count += 1;
+        }
+        if !is_noted(frame) {
+            return None;
+        }
+        let known = &mut self.took[..std::mem::take(&mut self.count)];
+        known.sort_unstable();
+        known.get(known.len() / 2).copied()
+    }
+}
+
+/// The mean of what was noted, of which the last counts half, the one before a quarter and so on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Cost {
     /// 0 before the first.
@@ -35,6 +67,18 @@ impl Cost {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_noted_is_the_median_of_what_was_timed() {
+        let (mut timings, mut noted) = (Timings::default(), Vec::new());
+        for frame in (0..3 * FRAMES_PER_NOTE).filter(|&frame| is_timed(frame)) {
+            // Every third one is interrupted.
+            let took = if frame % 3 == 0 { 1_000 } else { 10 + frame / FRAMES_PER_NOTE };
+            noted.extend(timings.add(frame, Duration::from_micros(took)).map(|took| (frame, took)));
+        }
+        let micros = |(frame, took)| (frame, Duration::from_micros(took));
+        assert_eq!(noted, [(28, 10), (60, 11), (92, 12)].map(micros));
+    }
 
     #[test]
     fn what_was_interrupted_counts_at_most_double() {

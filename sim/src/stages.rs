@@ -177,7 +177,7 @@ impl Stages {
         *memory = received.emptied();
         block.refresh();
         if let Some(began) = began {
-            block.note_cost(began.elapsed());
+            block.add_timing(frame, began.elapsed());
         }
     }
 

@@ -45,8 +45,13 @@ fn number_and_size_of_blocks() {
         assert_eq!(blocks.len(), expected + 1, "{objects} particles, {workers} workers");
         let sizes: Vec<usize> =
             blocks[..expected].iter().map(|block| block.objects().len()).collect();
-        // Eight are advanced side by side; with fewer objects each is a block.
-        let share = if objects == expected { 1 } else { 8 };
+        // Eight are advanced side by side; blocks of twice to some five times as many differ by fours, and few objects
+        // are blocks by themselves.
+        let share = match objects / expected {
+            1 => 1,
+            16..45 => 4,
+            _ => 8,
+        };
         let (last, whole) = sizes.split_last().expect("blocks");
         assert!(whole.iter().all(|size| size % share == 0), "{sizes:?}");
         let shares = sizes.iter().map(|size| size.div_ceil(share));

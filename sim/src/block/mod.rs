@@ -8,6 +8,7 @@ use glam::Vec3;
 
 use self::extents::{Extents, Overlaps, OverlapsWithin, Reaches};
 use crate::behavior::batch::Order;
+use crate::cost::Timings;
 use crate::geometry::{Bounds, Extent};
 use crate::interaction::{Member, group_set};
 use crate::object::{Object, ObjectId};
@@ -41,6 +42,8 @@ pub struct Block {
     extents: Extents,
     /// What the objects' updates take, in seconds.
     costs: Vec<f32>,
+    /// What its last updates took.
+    timings: Timings,
     /// Whether its objects may be in another order than theirs.
     disordered: bool,
 }
@@ -129,7 +132,14 @@ impl Block {
         }
     }
 
-    /// Notes what an update took. Now and then is also when their order is looked at anew: messages may have changed
+    /// Adds what its update took in a frame that is timed.
+    pub(crate) fn add_timing(&mut self, frame: u64, took: Duration) {
+        if let Some(took) = self.timings.add(frame, took) {
+            self.note_cost(took);
+        }
+    }
+
+    /// Notes what its updates take. Now and then is also when their order is looked at anew: messages may have changed
     /// by what it is.
     pub(crate) fn note_cost(&mut self, took: Duration) {
         // Bodies that are advanced together have no time of their own.

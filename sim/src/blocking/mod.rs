@@ -4,8 +4,9 @@ mod split;
 
 use thiserror::Error;
 
-use self::split::{Key, Members};
+use self::split::{Division, Key, Members, Parts};
 use crate::block::Block;
+use crate::cost::FRAMES_PER_NOTE;
 use crate::object::{Object, ObjectId};
 use crate::simd::HALF;
 
@@ -41,8 +42,8 @@ pub enum BlockingError {
     },
 }
 
-/// The frames between two regroupings: in so many a particle moves by a fraction of a block.
-pub const FRAMES_PER_BLOCKING: u64 = 32;
+/// The frames between two regroupings, usually 32: in so many a particle moves by a fraction of a block.
+pub const FRAMES_PER_BLOCKING: u64 = FRAMES_PER_NOTE;
 
 /// Objects up to which each is a block of its own: few objects are heavy or uneven ones, and blocks of them
 /// would be too.
@@ -60,6 +61,9 @@ const FULL: usize = 45;
 /// Objects of a block that leave few of its lanes empty, however uneven they are; usually 70, a few more than twice as
 /// many as are advanced side by side.
 const FILLING: usize = 70;
+/// Objects that are shared out at a time where blocks have fewer than [`FULL`], so that some lanes are empty anyhow, but
+/// still enough for all lanes; usually 4. Of single ones more would come and go as costs change by little.
+const FEW: usize = 4;
 /// The share of scenery's whole extent from which on a part of it reaches far; a quarter.
 const FAR: f32 = 0.25;
 /// How much larger than others the blocks of a home may usually be that is to have more objects; twice.
@@ -72,6 +76,10 @@ const UNEVENNESS: usize = 2;
 /// were with, only those that do not are moved.
 pub struct Blocking {
     members: Vec<Members>,
+    /// How the blocks of moving objects were last divided, by block.
+    of_blocks: Vec<Division>,
+    /// The same by home.
+    of_homes: Vec<Division>,
     keys: Vec<Key>,
     /// The number of the block that each object is, or is to be, in, by the objects' numbers.
     block_of: Vec<u32>,
@@ -84,7 +92,7 @@ pub struct Blocking {
     moving_blocks: usize,
     /// The last of all.
     solitary_blocks: usize,
-    /// Moving objects are shared out so many at a time: as many as are advanced side by side, or one by one.
+    /// Moving objects are shared out so many at a time.
     share: usize,
 }
 
@@ -152,13 +160,15 @@ impl Blocking {
             Grain::Pairwise => scenery.into_iter().map(|id| Members::of(vec![id])).collect(),
             Grain::Spatial => group_scenery(&objects, scenery, workers),
         };
-        let share = if moving_blocks == moving.len() { 1 } else { HALF };
+        let share = share(moving.len(), moving_blocks);
         // How many each block has changes.
         let room = most_shares(moving.len(), share, moving_blocks) * share;
         let mut members = Vec::new();
         members.resize_with(moving_blocks, || Members::of(Vec::with_capacity(room)));
         let mut keys: Vec<Key> = moving.iter().map(|&id| Key::of(&objects[id as usize])).collect();
-        split::evenly(&mut keys, &mut members, 0, share);
+        let mut of_blocks = vec![Division::default(); moving_blocks];
+        let parts = Parts { members: &mut members, of_blocks: &mut of_blocks, of_homes: &mut [] };
+        split::evenly(&mut keys, parts, 0, share);
         number(&mut members);
         members.extend(scenery);
         let size = solitary.len().div_ceil(count(solitary.len()).max(1)).max(1);
@@ -177,6 +187,8 @@ impl Blocking {
         }
         let blocking = Self {
             members,
+            of_blocks,
+            of_homes: Vec::new(),
             keys,
             block_of,
             leaving: Vec::with_capacity(moving.len()),
@@ -194,9 +206,11 @@ impl Blocking {
     pub fn split(&mut self, blocks: &mut [Block]) {
         let Some(blocks) = blocks.get_mut(..self.moving_blocks) else { return };
         self.list(blocks);
-        let members = &mut self.members[..self.moving_blocks];
-        split::evenly(&mut self.keys, members, 0, self.share);
-        number(members);
+        let Self { members, of_blocks, of_homes, .. } = self;
+        let members = &mut members[..self.moving_blocks];
+        let parts = Parts { members, of_blocks, of_homes };
+        split::evenly(&mut self.keys, parts, 0, self.share);
+        number(&mut self.members[..self.moving_blocks]);
         self.regroup(blocks);
     }
 
@@ -212,9 +226,13 @@ impl Blocking {
         for (place, members) in self.members[first_solitary..].iter_mut().enumerate() {
             members.home = place as u32 % homes;
         }
+        let most = most_shares(self.keys.len(), self.share, self.moving_blocks);
+        self.of_homes.resize(homes as usize, Division::default());
+        let Self { members, of_blocks, of_homes, .. } = self;
+        let members = &mut members[..self.moving_blocks];
+        let parts = Parts { members, of_blocks, of_homes };
+        split::among_homes(&mut self.keys, parts, 0..homes, self.share, most, besides);
         let members = &mut self.members[..self.moving_blocks];
-        let most = most_shares(self.keys.len(), self.share, members.len());
-        split::among_homes(&mut self.keys, members, 0..homes, self.share, most, besides);
         number(members);
         members.sort_unstable_by_key(Members::order);
         self.regroup(blocks);
@@ -273,6 +291,16 @@ impl Blocking {
     }
 }
 
+/// How many objects are shared out to blocks at a time: as many as are advanced side by side, or fewer, or one by one where
+/// each is a block.
+fn share(objects: usize, blocks: usize) -> usize {
+    match objects / blocks.max(1) {
+        0 | 1 => 1,
+        objects if (2 * HALF..FULL).contains(&objects) => FEW,
+        _ => HALF,
+    }
+}
+
 /// How many shares one of so many blocks may come to have.
 fn most_shares(objects: usize, share: usize, blocks: usize) -> usize {
     UNEVENNESS * objects.div_ceil(share).div_ceil(blocks.max(1))
@@ -317,7 +345,9 @@ fn group_scenery(objects: &[Object], ids: Vec<u32>, workers: usize) -> Vec<Membe
     let mut members = Vec::new();
     let blocks = if rest.len() <= SINGLE_OBJECTS { 1 } else { block_count(rest.len(), workers) };
     members.resize_with(blocks, || Members::of(Vec::new()));
-    split::evenly(&mut keys(&rest), &mut members, 0, HALF);
+    let mut of_blocks = vec![Division::default(); blocks];
+    let parts = Parts { members: &mut members, of_blocks: &mut of_blocks, of_homes: &mut [] };
+    split::evenly(&mut keys(&rest), parts, 0, HALF);
     members.push(Members::of(walls));
     members.retain(|members| !members.ids.is_empty());
     members

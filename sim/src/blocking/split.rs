@@ -11,8 +11,8 @@ use crate::object::{Object, ObjectId};
 /// Who is in a block.
 pub(super) struct Members {
     pub(super) ids: Vec<u32>,
-    /// What their updates take, in seconds, as far as it is known.
-    cost: f32,
+    /// What their updates take, in nanoseconds, as far as it is known.
+    cost: u64,
     pub(super) home: u32,
     /// The number of their part of space, as it was split: close in space are close in number.
     pub(super) part: usize,
@@ -21,13 +21,13 @@ pub(super) struct Members {
 impl Members {
     /// These, at home 0, whose updates take nobody knows how long.
     pub(super) fn of(ids: Vec<u32>) -> Self {
-        Self { ids, cost: 0.0, home: 0, part: 0 }
+        Self { ids, cost: 0, home: 0, part: 0 }
     }
 
     /// By home; there by the power of two of their cost, the dearest first; there by part, for neighbours
     /// that come one after the other meet in the cache.
-    pub(super) fn order(&self) -> (u32, Reverse<i32>, usize) {
-        (self.home, Reverse(self.cost.log2() as i32), self.part)
+    pub(super) fn order(&self) -> (u32, Reverse<Option<u32>>, usize) {
+        (self.home, Reverse(self.cost.checked_ilog2()), self.part)
     }
 }
 
@@ -36,7 +36,8 @@ impl Members {
 pub(super) struct Key {
     center: [f32; 3],
     pub(super) id: u32,
-    cost: f32,
+    /// In nanoseconds: whole numbers are added up several at a time.
+    cost: u32,
 }
 
 impl Key {
@@ -44,9 +45,63 @@ impl Key {
         Self::new((object.id(), object.center(), object.cost()))
     }
 
-    /// Of an object with this number, place and cost.
+    /// Of an object with this number, place and cost, in seconds.
     pub(super) fn new((id, center, cost): (ObjectId, Vec3, f32)) -> Self {
-        Self { center: center.to_array(), id: id.0, cost }
+        Self { center: center.to_array(), id: id.0, cost: (cost * 1e9) as u32 }
+    }
+}
+
+/// How a part of space was last divided in two. It is again, as long as that is nearly best: what is divided another way
+/// goes from one core's caches to another's.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Division {
+    axis: usize,
+    /// Blocks of the first of the two.
+    blocks: usize,
+}
+
+impl Division {
+    /// Along the longest side, or the last one while none is notably longer.
+    pub(super) fn find_axis(&mut self, keys: &[Key]) -> usize {
+        let sides = sides(keys);
+        for axis in 0..3 {
+            if sides[axis] > NOTABLY * sides[self.axis] {
+                self.axis = axis;
+            }
+        }
+        self.axis
+    }
+
+    /// Of so many blocks a share of so many, as nearly as there are whole ones, or as many as last time while that is not
+    /// farther off than by [`STAY`].
+    pub(super) fn find_blocks(&mut self, of: usize, share: f32) -> usize {
+        let wanted = share * of as f32;
+        if (wanted - self.blocks as f32).abs() > STAY {
+            self.blocks = wanted.round() as usize;
+        }
+        self.blocks = self.blocks.clamp(1, of - 1);
+        self.blocks
+    }
+}
+
+/// Blocks, and how they were last divided.
+pub(super) struct Parts<'p> {
+    pub(super) members: &'p mut [Members],
+    /// For each block but the first, how those from it on were divided from those before.
+    pub(super) of_blocks: &'p mut [Division],
+    /// The same for homes.
+    pub(super) of_homes: &'p mut [Division],
+}
+
+impl<'p> Parts<'p> {
+    fn divide(self, blocks: usize, homes: usize) -> [Self; 2] {
+        let (low, high) = self.members.split_at_mut(blocks);
+        let (low_blocks, high_blocks) = self.of_blocks.split_at_mut(blocks);
+        let (low_homes, high_homes) = self.of_homes.split_at_mut(homes);
+        [
+            Self { members: low, of_blocks: low_blocks, of_homes: low_homes },
+            Self { members: high, of_blocks: high_blocks, of_homes: high_homes },
+        ]
     }
 }
 
@@ -56,64 +111,85 @@ impl Key {
 /// more than `most` shares, which is enough for all.
 pub(super) fn among_homes(
     keys: &mut [Key],
-    members: &mut [Members],
+    parts: Parts<'_>,
     homes: Range<u32>,
     share: usize,
     most: usize,
     besides: f32,
 ) {
-    let shares = keys.len().div_ceil(share);
-    if homes.len() < 2 || members.len() < 2 || shares < 2 {
-        return evenly(keys, members, homes.start, share);
+    let (shares, all) = (keys.len().div_ceil(share), parts.members.len());
+    if homes.len() < 2 || all < 2 || shares < 2 {
+        return evenly(keys, parts, homes.start, share);
     }
-    let half = homes.start + homes.len() as u32 / 2;
-    let part = (half - homes.start) as f32 / homes.len() as f32;
-    let total = cost(keys);
-    let axis = longest_side(keys);
-    let wanted = if total > 0.0 {
-        let objects = costing(keys, axis, part * (total + besides) - besides);
-        objects as f32 / share as f32
-    } else {
-        part * shares as f32
-    };
+    let first_homes = homes.len() / 2;
+    let half = homes.start + first_homes as u32;
+    let part = first_homes as f32 / homes.len() as f32;
+    let division = &mut parts.of_homes[first_homes];
+    let (total, axis) = (cost(keys), division.find_axis(keys));
+    let parted = (total > 0).then(|| {
+        let wanted = part * (total as f32 * 1e-9 + besides) - besides;
+        part_by_cost(keys, axis, share, total, (wanted * 1e9) as u64)
+    });
+    let wanted = parted.unwrap_or((part * shares as f32).round() as usize);
     // Nor is any to become very small.
-    let least = 0.5 * shares as f32 / members.len() as f32;
-    let wanted = wanted.clamp(least, shares as f32 - least).round() as usize;
-    let low_shares = wanted.clamp(1, shares - 1);
-    let blocks = (members.len() * low_shares + shares / 2) / shares;
-    let blocks = blocks.clamp(1, members.len() - 1);
-    let high_most = most * (members.len() - blocks);
-    let low_shares = low_shares.clamp(shares.saturating_sub(high_most), most * blocks);
-    let (low, high) = part_at(keys, low_shares * share, axis);
-    let (low_members, high_members) = members.split_at_mut(blocks);
-    among_homes(low, low_members, homes.start..half, share, most, besides);
-    among_homes(high, high_members, half..homes.end, share, most, 0.0);
+    let least = (0.5 * shares as f32 / all as f32).round() as usize;
+    let low_shares = wanted.max(least).min(shares.saturating_sub(least)).clamp(1, shares - 1);
+    let blocks = division.find_blocks(all, low_shares as f32 / shares as f32);
+    let low_shares = low_shares.clamp(shares.saturating_sub(most * (all - blocks)), most * blocks);
+    let (low, high) = if parted == Some(low_shares) {
+        keys.split_at_mut(low_shares * share)
+    } else {
+        part_at(keys, low_shares * share, axis)
+    };
+    let [low_parts, high_parts] = parts.divide(blocks, first_homes);
+    among_homes(low, low_parts, homes.start..half, share, most, besides);
+    among_homes(high, high_parts, half..homes.end, share, most, 0.0);
 }
 
-/// How many objects come first along an axis, and as keys then, before they cost so much.
-fn costing(keys: &mut [Key], axis: usize, most: f32) -> usize {
-    let (mut low, mut high, mut before) = (0, keys.len(), 0.0);
+/// How many shares come first along an axis, and as keys then, that cost nearly `wanted`, in nanoseconds, of what all do.
+pub(super) fn part_by_cost(
+    keys: &mut [Key],
+    axis: usize,
+    share: usize,
+    total: u64,
+    wanted: u64,
+) -> usize {
+    let (mut low, mut high) = (0, keys.len().div_ceil(share));
+    let (mut below, mut above) = (0, total);
+    let mut guesses = 0;
     while high - low > 1 {
-        let middle = (high - low) / 2;
-        let (first, _) = part_at(&mut keys[low..high], middle, axis);
-        let with_first = before + cost(first);
-        if with_first <= most {
-            (low, before) = (low + middle, with_first);
+        let between = high - low;
+        let middle = if guesses < GUESSES {
+            // As if all cost the same, and rather too far: then little is left between this one and the next.
+            let far = (between as f32).sqrt() as usize * usize::from(guesses > 0);
+            let part = wanted.saturating_sub(below) as f32 / (above - below).max(1) as f32;
+            let guess = low + (part * between as f32) as usize;
+            if part < 0.5 { guess + far } else { guess.saturating_sub(far) }
         } else {
-            high = low + middle;
+            low + between / 2
+        };
+        guesses += 1;
+        let middle = middle.clamp(low + 1, high - 1);
+        let end = keys.len().min(high * share);
+        let (first, _) = part_at(&mut keys[low * share..end], (middle - low) * share, axis);
+        let with_first = below + cost(first);
+        if with_first <= wanted {
+            (low, below) = (middle, with_first);
+        } else {
+            (high, above) = (middle, with_first);
         }
     }
-    low
+    if wanted.saturating_sub(below) <= above.saturating_sub(wanted) { low } else { high }
 }
 
-fn cost(keys: &[Key]) -> f32 {
-    keys.iter().map(|key| key.cost).sum()
+fn cost(keys: &[Key]) -> u64 {
+    keys.iter().map(|key| u64::from(key.cost)).sum()
 }
 
 /// Shares the objects out evenly to blocks of one home, `share` at a time: halves along the longest side until each
 /// part is one block. Every block gets a share; the last may be short of objects.
-pub(super) fn evenly(keys: &mut [Key], members: &mut [Members], home: u32, share: usize) {
-    match members {
+pub(super) fn evenly(keys: &mut [Key], parts: Parts<'_>, home: u32, share: usize) {
+    match parts.members {
         [] => {}
         [only] => {
             only.ids.clear();
@@ -121,14 +197,14 @@ pub(super) fn evenly(keys: &mut [Key], members: &mut [Members], home: u32, share
             only.cost = cost(keys);
             only.home = home;
         }
-        _ => {
+        members => {
             let half = members.len() / 2;
             let middle = keys.len().div_ceil(share) * half / members.len() * share;
-            let axis = longest_side(keys);
+            let axis = parts.of_blocks[half].find_axis(keys);
             let (low, high) = part_at(keys, middle, axis);
-            let (low_members, high_members) = members.split_at_mut(half);
-            evenly(low, low_members, home, share);
-            evenly(high, high_members, home, share);
+            let [low_parts, high_parts] = Parts { members, ..parts }.divide(half, 0);
+            evenly(low, low_parts, home, share);
+            evenly(high, high_parts, home, share);
         }
     }
 }
@@ -145,29 +221,30 @@ fn part_at(keys: &mut [Key], count: usize, axis: usize) -> (&mut [Key], &mut [Ke
     keys.split_at_mut(count.min(keys.len()))
 }
 
-/// How much longer than the sides before it a side must be to be the longest; a quarter. Objects that fill a cube would
-/// else be split another way each time, and go from one core's caches to another's.
+/// How often it is guessed where a part ends, before what is left is halved each time: with costs that are nothing alike
+/// guesses come no nearer. Usually 4; three do where they are alike.
+const GUESSES: usize = 4;
+
+/// How much longer than the side that was last divided another must be to be divided in its place; a quarter.
 const NOTABLY: f32 = 1.25;
+
+/// How far the number of blocks that a part has may be from what it should be, for it to stay; usually 0.75, where whole
+/// numbers are 0.5 off at most.
+const STAY: f32 = 0.75;
 
 /// How far they extend along each axis.
 fn sides(keys: &[Key]) -> [f32; 3] {
-    [0, 1, 2].map(|axis: usize| {
-        let values = keys.iter().map(|key| key.center[axis]);
-        let (low, high) = values
-            .fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), value| (l.min(value), h.max(value)));
-        high - low
-    })
+    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for key in keys {
+        for axis in 0..3 {
+            low[axis] = low[axis].min(key.center[axis]);
+            high[axis] = high[axis].max(key.center[axis]);
+        }
+    }
+    [0, 1, 2].map(|axis: usize| high[axis] - low[axis])
 }
 
 /// How far they extend along the longest side; 0 for none.
 pub(super) fn span(keys: &[Key]) -> f32 {
     sides(keys).into_iter().fold(0.0, f32::max)
-}
-
-/// The axis along which they extend notably farther than along those before it.
-fn longest_side(keys: &[Key]) -> usize {
-    let sides = sides(keys);
-    let longer =
-        |longest, axis| if sides[axis] > NOTABLY * sides[longest] { axis } else { longest };
-    (1..3).fold(0, longer)
 }

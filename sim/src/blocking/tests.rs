@@ -219,6 +219,30 @@ fn who_has_no_time_left_is_given_little() {
     assert_eq!(cost(&given[0]), 40, "{given:?}");
 }
 
+/// Objects in a box with these sides, in metres, with these costs, in nanoseconds.
+fn in_a_box(sides: Vec3, costs: &[u32]) -> Vec<Key> {
+    let place = |id: usize| Vec3::new((id % 7) as f32, (id % 11) as f32, (id % 13) as f32);
+    let unit = Vec3::new(6.0, 10.0, 12.0);
+    let key = |(id, &cost): (usize, &u32)| {
+        Key::new((ObjectId(id as u32), place(id) / unit * sides, (cost as f32 + 0.5) * 1e-9))
+    };
+    costs.iter().enumerate().map(key).collect()
+}
+
+#[test]
+fn a_part_is_divided_as_last_time_while_that_is_nearly_best() {
+    let mut division = Division::default();
+    let mut axis = |x, y, z| division.find_axis(&in_a_box(Vec3::new(x, y, z), &[1; 1_001]));
+    assert_eq!(axis(1.0, 1.2, 1.2), 0);
+    assert_eq!(axis(1.0, 1.3, 1.2), 1);
+    assert_eq!(axis(1.2, 1.0, 1.1), 1);
+    assert_eq!(axis(1.0, 1.0, 1.3), 2);
+    let mut blocks = |of, share| division.find_blocks(of, share);
+    let shares = [0.46, 0.48, 0.49, 0.475, 0.46];
+    assert_eq!(shares.map(|share| blocks(20, share)), [9, 9, 10, 10, 9]);
+    assert_eq!([0.1, 0.9].map(|share| blocks(2, share)), [1, 1]);
+}
+
 /// Where part after part has the cheaper half, that of one block grows from split to split.
 #[test]
 fn no_block_outgrows_its_room_however_uneven_costs_are() {
@@ -233,7 +257,10 @@ fn no_block_outgrows_its_room_however_uneven_costs_are() {
             };
             let mut keys: Vec<Key> = (0..OBJECTS).map(key).collect();
             let mut members: Vec<Members> = (0..HOMES).map(|_| Members::of(Vec::new())).collect();
-            split::among_homes(&mut keys, &mut members, 0..HOMES, HALF, most, 0.0);
+            let mut divisions = [(); 2].map(|()| vec![Division::default(); HOMES as usize]);
+            let [of_blocks, of_homes] = &mut divisions;
+            let parts = Parts { members: &mut members, of_blocks, of_homes };
+            split::among_homes(&mut keys, parts, 0..HOMES, HALF, most, 0.0);
             let sizes = members.iter().map(|members| members.ids.len());
             assert_eq!(sizes.clone().sum::<usize>(), OBJECTS);
             assert!(
@@ -248,6 +275,31 @@ fn no_block_outgrows_its_room_however_uneven_costs_are() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
+    fn a_part_costs_as_nearly_as_shares_can_what_is_wanted(
+        costs in proptest::collection::vec(prop_oneof![1..100_u32, 1..100_000_u32], 1..300),
+        share in 1..9_usize,
+        part in 0.0..1.1,
+    ) {
+        let mut keys = in_a_box(Vec3::ONE, &costs);
+        let total = costs.iter().copied().map(u64::from).sum::<u64>();
+        let wanted = (part * total as f64) as u64;
+        let shares = split::part_by_cost(&mut keys, 1, share, total, wanted);
+        let ids = |keys: &[Key]| keys.iter().map(|key| key.id).collect::<Vec<_>>();
+        let (low, high) = keys.split_at((shares * share).min(keys.len()));
+        let [mut low, mut high] = [ids(low), ids(high)];
+        let mut sorted: Vec<u32> = (0..costs.len() as u32).collect();
+        sorted.sort_by_key(|id| (id % 11, *id));
+        low.sort_by_key(|id| (id % 11, *id));
+        high.sort_by_key(|id| (id % 11, *id));
+        prop_assert_eq!([low, high].concat(), &sorted[..]);
+        let cost = |shares: usize| -> u64 {
+            sorted.iter().take(shares * share).map(|&id| u64::from(costs[id as usize])).sum()
+        };
+        let off = (0..=costs.len().div_ceil(share)).map(|shares| cost(shares).abs_diff(wanted));
+        prop_assert_eq!(Some(cost(shares).abs_diff(wanted)), off.min());
+    }
+
+    #[test]
     fn all_are_dealt_out_to_blocks_of_like_size(
         micros in proptest::collection::vec(1..100_u64, 1..400),
         homes in 1..9_u32,
@@ -256,7 +308,7 @@ proptest! {
         let given = dealt(&micros, homes, besides);
         prop_assert_eq!(given.iter().map(|home| cost(home)).sum::<u64>(), micros.iter().sum());
         let sizes: Vec<usize> = given.iter().flatten().map(|&(_, objects)| objects).collect();
-        let even = micros.len().div_ceil(sizes.len()).next_multiple_of(HALF);
+        let even = micros.len().div_ceil(sizes.len()).next_multiple_of(share(micros.len(), sizes.len()));
         prop_assert!(sizes.iter().all(|size| (1..=UNEVENNESS * even).contains(size)), "{:?}", given);
     }
 }
