@@ -71,7 +71,7 @@ fn rendering(share: f64) -> [String; 2] {
     [
         format!(", rendering {share:.0} % of the work"),
         format!(
-            "Rendering is {share:.1} % of the serial version's work, by its medians with and without; \
+            "Rendering is {share:.1} % of the serial version's work, which is timed with and without in each round; \
              {wanted:.0} % are wanted. "
         ),
     ]
@@ -115,24 +115,20 @@ impl Study<'_> {
                 let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };
                 laboratory.race(race, &runners)
             };
-            let without = race(RenderLoad::Null)?;
-            let with = race(RenderLoad::StandIn(stand_in))?;
-            for (outcome, name) in [&without, &with].into_iter().zip(names) {
+            for (load, name) in
+                [RenderLoad::Null, RenderLoad::StandIn(stand_in)].into_iter().zip(names)
+            {
+                let outcome = race(load)?;
                 outcome.add_rounds(&mut all_rounds);
-                outcome.add_summary(&without, &mut summary);
-                figures.push(self.figure(name, outcome, &without)?);
+                outcome.add_summary(&mut summary);
+                figures.push(self.figure(name, &outcome)?);
             }
         }
         Ok(Report { tables: vec![summary, all_rounds], figures, shown: None })
     }
 
-    /// The figure of a race; `without` is the same one without rendering.
-    fn figure(
-        &self,
-        name: &'static str,
-        outcome: &Outcome,
-        without: &Outcome,
-    ) -> Result<Figure, ExperimentError> {
+    /// The figure of a race.
+    fn figure(&self, name: &'static str, outcome: &Outcome) -> Result<Figure, ExperimentError> {
         let kinds = Runner::parallel(1).map(|runner| runner.executor);
         let lines = kinds.enumerate().map(|(color, executor)| Line {
             label: executor.name().to_owned(),
@@ -146,7 +142,7 @@ impl Study<'_> {
         };
         let share = match outcome.race.load {
             RenderLoad::Null => None,
-            RenderLoad::StandIn(_) => outcome.render_share(Rounds::Good, without),
+            RenderLoad::StandIn(_) => outcome.render_share(Rounds::Good),
         };
         let [in_title, rendering] = share.map(rendering).unwrap_or_default();
         let frames = outcome.race.timed() + ". ";

@@ -89,11 +89,14 @@ impl Experiment {
             Self::Scalability => plan.scalability.work(1 + threads, WARM_UP),
             Self::LoadBalance => plan.load_balance.work(1, 0),
             Self::PerFrame => plan.per_frame.work(threads, 0),
-            // Without and with rendering.
-            Self::Compare => 2 * plan.compare.work(compare::runners(&plan.threads).len(), WARM_UP),
+            // Without and with rendering, beside which the serial version is timed without once more.
+            Self::Compare => {
+                let runners = compare::runners(&plan.threads).len();
+                plan.compare.work(2 * runners + 1, WARM_UP)
+            }
             Self::Retraction => {
                 let runners = compare::runners(&plan.retraction.threads).len();
-                2 * plan.retraction.work(runners, WARM_UP)
+                plan.retraction.work(2 * runners + 1, WARM_UP)
             }
         }
     }

@@ -1,5 +1,6 @@
 //! What a race came to, and the rows it makes in the tables.
 
+use super::load::RenderLoad;
 use super::race::{Race, Runner};
 use super::speedup::efficiency;
 use super::statistics::Quartiles;
@@ -53,6 +54,8 @@ pub struct Outcome {
     pub runners: Vec<Runner>,
     /// The times, with a contender for each runner.
     pub series: Series,
+    /// The contender that is the serial version without rendering, where that is timed.
+    pub without_rendering: Option<usize>,
 }
 
 impl Outcome {
@@ -87,19 +90,19 @@ impl Outcome {
         Some(self.speed_up(self.series.best_rounds(), runner, over)?.median)
     }
 
-    /// What share of the serial version's work rendering is, if `without` is the same race without it: by the medians
-    /// of what it takes in these rounds of either, all where none is good.
+    /// What share of the serial version's work rendering is: 0 where nothing is rendered, or the median of these rounds,
+    /// in each of which it is timed with and without; of all where none is good.
     #[must_use]
-    pub fn render_share(&self, which: Rounds, without: &Self) -> Option<f64> {
-        let seconds = |outcome: &Self| {
-            let serial = outcome.index(Runner::SERIAL)?;
-            let which = match which {
-                Rounds::All => Rounds::All,
-                Rounds::Good => outcome.series.best_rounds(),
-            };
-            Some(outcome.series.seconds(which, serial)?.median)
+    pub fn render_share(&self, which: Rounds) -> Option<f64> {
+        if self.race.load == RenderLoad::Null {
+            return Some(0.0);
+        }
+        let which = match which {
+            Rounds::All => Rounds::All,
+            Rounds::Good => self.series.best_rounds(),
         };
-        Some(1.0 - seconds(without)? / seconds(self)?)
+        let (with, without) = (self.index(Runner::SERIAL)?, self.without_rendering?);
+        Some(1.0 - self.series.ratio(which, without, with)?.median)
     }
 
     /// Adds a row for each runner and round.
@@ -125,13 +128,12 @@ impl Outcome {
         }
     }
 
-    /// Adds two rows for each runner: over all rounds, and over the good ones if there are any. `without` is the same
-    /// race without rendering, this one if it has none.
-    pub fn add_summary(&self, without: &Self, table: &mut Table) {
+    /// Adds two rows for each runner: over all rounds, and over the good ones if there are any.
+    pub fn add_summary(&self, table: &mut Table) {
         let all = self.series.rounds().len();
         let good = all - self.series.marked();
         for (which, name, count) in [(Rounds::All, "all", all), (Rounds::Good, "good", good)] {
-            let share = self.render_share(which, without);
+            let share = self.render_share(which);
             for &runner in &self.runners {
                 self.add_summary_row(table, share, runner, (which, name, count));
             }
@@ -217,7 +219,7 @@ pub(super) mod tests {
     use super::*;
     use crate::experiment::calibrator::Phase;
     use crate::experiment::error::ExperimentError;
-    use crate::experiment::load::RenderLoad;
+    use crate::experiment::load::StandIn;
     use crate::experiment::subject::Subject;
     use crate::experiment::timing::Contender;
     use crate::scene::ParticleScene;
@@ -251,6 +253,7 @@ pub(super) mod tests {
             race: Race { subject, load, warm_up, frames, rounds },
             runners: seconds.iter().map(|&(runner, _)| runner).collect(),
             series: series.expect("nothing fails"),
+            without_rendering: None,
         }
     }
 
@@ -269,7 +272,7 @@ pub(super) mod tests {
         let third = ["4", "null", "pipeline", "2", "0", "2.500000", "40.00", "2.000", "100.0", "0"];
         assert_eq!(table.rows[2], third);
         let mut table = Outcome::summary_table("summary");
-        outcome.add_summary(&outcome, &mut table);
+        outcome.add_summary(&mut table);
         let row = &table.rows[2];
         assert_eq!(row[..9], ["4", "null", "0.0000", "1", "100", "pipeline", "2", "all", "3"]);
         assert_eq!(row[9..13], ["2.500000", "2.500000", "2.500000", "40.00"]);
@@ -277,30 +280,36 @@ pub(super) mod tests {
         assert_eq!(row[13..], ratios, "S_s, S_p and E_p");
     }
 
+    /// With rendering, where the serial version takes these seconds in round after round, and those without it; the last
+    /// round is marked.
+    fn with_rendering(with: [f64; 3], without: [f64; 3]) -> Outcome {
+        let times = [(Runner::SERIAL, with.to_vec()), (Runner::pipeline(1), without.to_vec())];
+        let mut outcome = outcome_by_rounds(12, &times, &[2.0, 2.0, 2.0, 1.0]);
+        let stand_in = StandIn::calibrated(&outcome.race.subject, 1).expect("a valid scene");
+        outcome.race.load = RenderLoad::StandIn(stand_in);
+        outcome.runners.pop();
+        Outcome { without_rendering: Some(1), ..outcome }
+    }
+
     #[test]
-    fn the_share_of_rendering_is_what_the_serial_version_takes_longer() {
-        let one = Runner::pipeline(1);
-        let without = outcome(1, &[(one, 1.0), (Runner::SERIAL, 3.0)], &[2.0; 4]);
-        let with = outcome(1, &[(Runner::SERIAL, 4.0), (one, 9.0)], &[2.0; 4]);
-        assert_eq!(with.render_share(Rounds::Good, &without), Some(0.25));
-        assert_eq!(without.render_share(Rounds::Good, &without), Some(0.0));
-        let unknown = outcome(1, &[(one, 1.0)], &[2.0; 4]);
-        assert_eq!(with.render_share(Rounds::Good, &unknown), None);
+    fn the_share_of_rendering_is_of_each_round() {
+        // From round to round the machine is twice as fast.
+        let outcome = with_rendering([8.0, 4.0, 2.0], [6.0, 3.0, 1.0]);
+        assert_eq!(outcome.render_share(Rounds::Good), Some(0.25));
+        let outcome = with_rendering([8.0, 4.0, 2.0], [6.0, 2.0, 1.0]);
+        assert_eq!(outcome.render_share(Rounds::All), Some(0.5));
+        let unknown = Outcome { without_rendering: None, ..outcome };
+        assert_eq!(unknown.render_share(Rounds::Good), None);
     }
 
     #[test]
     fn a_row_is_of_its_own_rounds() {
-        let run = |seconds: [f64; 3]| {
-            // The last round is marked.
-            outcome_by_rounds(12, &[(Runner::SERIAL, seconds.to_vec())], &[2.0, 2.0, 2.0, 1.0])
-        };
-        let (without, with) = (run([3.0, 3.0, 6.0]), run([4.0, 6.0, 12.0]));
         let mut table = Outcome::summary_table("summary");
-        with.add_summary(&without, &mut table);
+        with_rendering([4.0, 6.0, 12.0], [3.0, 3.0, 6.0]).add_summary(&mut table);
         let seen = |row: usize| [2, 7, 10, 12].map(|column| table.rows[row][column].as_str());
         assert_eq!(seen(0), ["0.5000", "all", "6.000000", "2.00"]);
         // The median of 3 and 2; by the median of seconds it would be 2.4.
-        assert_eq!(seen(1), ["0.4000", "good", "5.000000", "2.50"]);
+        assert_eq!(seen(1), ["0.3750", "good", "5.000000", "2.50"]);
     }
 
     #[test]

@@ -98,8 +98,9 @@ impl Race {
         }
     }
 
-    /// Times the runners against each other. `phase` measures the machine's present phase, `done` is
-    /// told after each run.
+    /// Times the runners against each other, and the serial one without rendering, too, where it renders: then it is known
+    /// what share that is in the same rounds. `phase` measures the machine's present phase, `done` is told after each
+    /// run.
     ///
     /// # Errors
     /// The environment cannot be built or run, an object was quarantined, or the runs did not all end
@@ -124,6 +125,7 @@ impl Race {
     ) -> Result<Outcome, ExperimentError> {
         let expected = Cell::new(None);
         let on_frame = RefCell::new(on_frame);
+        let bare = Self { load: RenderLoad::Null, ..self.clone() };
         let contender = |(index, &runner): (usize, &Runner)| {
             let (expected, on_frame) = (&expected, &on_frame);
             let run = move || {
@@ -134,9 +136,16 @@ impl Race {
         };
         let mut contenders: Vec<Contender<'_>> =
             runners.iter().enumerate().map(contender).collect();
+        let renders = self.load != RenderLoad::Null && runners.contains(&Runner::SERIAL);
+        let without_rendering = renders.then_some(contenders.len());
+        if renders {
+            let run = || bare.once(Runner::SERIAL, &expected, &mut |_, _| ());
+            let label = "serial, not rendering".to_owned();
+            contenders.push(Contender { label, spins: false, run: Box::new(run) });
+        }
         let series = Series::measure(&mut contenders, self.rounds.clone(), phase, done)?;
         drop(contenders);
-        Ok(Outcome { race: self.clone(), runners: runners.to_vec(), series })
+        Ok(Outcome { race: self.clone(), runners: runners.to_vec(), series, without_rendering })
     }
 
     /// Seconds of one run.
@@ -215,6 +224,8 @@ fn check(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::load::StandIn;
+    use crate::experiment::timing::Rounds;
     use crate::scene::ParticleScene;
 
     const GOOD: Phase = Phase { gain: 2.0, ping_pong: 100.0 };
@@ -235,6 +246,22 @@ mod tests {
         assert_eq!(runs, 2 * ExecutorKind::ALL.len());
         assert_eq!(outcome.series.labels()[..2], ["serial × 1", "pipeline × 2"]);
         assert!(frames.iter().all(|frames| *frames == [2, 3, 4, 2, 3, 4]), "{frames:?}");
+    }
+
+    #[test]
+    fn what_rendering_takes_is_timed_beside_it() {
+        let subject = Subject::Particles(ParticleScene::new(4));
+        let stand_in = StandIn::calibrated(&subject, 1).expect("a valid scene");
+        let load = RenderLoad::StandIn(stand_in);
+        let race = Race { subject, load, warm_up: 0, frames: 1, rounds: 1..=1 };
+        let run =
+            |runners: &[Runner]| race.run(runners, &mut || GOOD, &mut || ()).expect("it runs");
+        let outcome = run(&[Runner::SERIAL, Runner::pipeline(1)]);
+        assert_eq!(outcome.without_rendering, Some(2));
+        assert_eq!(outcome.series.labels()[2], "serial, not rendering");
+        assert!(outcome.render_share(Rounds::All).is_some());
+        let outcome = run(&[Runner::pipeline(1)]);
+        assert_eq!((outcome.without_rendering, outcome.series.labels().len()), (None, 1));
     }
 
     #[test]

@@ -29,7 +29,7 @@ pub(super) fn run(laboratory: &mut Laboratory<'_>) -> Result<Report, ExperimentE
     let mut summary = Outcome::summary_table("scalability");
     for outcome in &outcomes {
         outcome.add_rounds(&mut rounds);
-        outcome.add_summary(outcome, &mut summary);
+        outcome.add_summary(&mut summary);
     }
     let figures = vec![
         throughput(&outcomes, &plan.threads)?,
