@@ -64,6 +64,27 @@ impl Cost {
     }
 }
 
+/// A cost that is noted as what it is of is timed.
+#[derive(Debug, Default)]
+pub(crate) struct TimedCost {
+    timings: Timings,
+    cost: Cost,
+}
+
+impl TimedCost {
+    /// Adds what it took in a frame that is timed.
+    pub(crate) fn add(&mut self, frame: u64, took: Duration) {
+        if let Some(took) = self.timings.add(frame, took) {
+            self.cost.note(took);
+        }
+    }
+
+    /// In seconds; 0 if nothing has been noted.
+    pub(crate) fn seconds(&self) -> f32 {
+        self.cost.seconds()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -119,8 +119,10 @@ fn together(bodies: &[Waiting], width: usize) -> (usize, usize) {
     if bodies.len() < FEWEST {
         return (1, HALF);
     }
-    // Nothing is cheaper than full lanes.
-    if bodies.len() >= 2 * width {
+    // Nothing is cheaper than lanes that are full to the end.
+    if let Some(last) = bodies.get(2 * width - 1)
+        && bodies[0].springs.substeps / 2 <= last.springs.substeps
+    {
         return (2 * width, width);
     }
     let mut best = Filling::alone(bodies);
@@ -241,8 +243,10 @@ mod tests {
         assert_eq!(first_of([8; 16]), (16, 2 * HALF));
         assert_eq!(first_of([8; 18]), (16, 2 * HALF));
         assert_eq!(first_of([8; 7]), (7, HALF));
-        let one_long = std::iter::once(1_000).chain([1; 15]);
-        assert_eq!(first_of(one_long), (1, HALF));
+        for others in [15, 31, 100] {
+            let one_long = std::iter::once(1_000).chain((0..others).map(|_| 1));
+            assert_eq!(first_of(one_long), (1, HALF), "{others} others");
+        }
     }
 
     #[test]

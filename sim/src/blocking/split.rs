@@ -61,13 +61,13 @@ pub(super) struct Division {
 }
 
 impl Division {
-    /// Along the longest side, or the last one while none is notably longer.
+    /// Along the longest side, or the last one while that is not notably shorter.
     pub(super) fn find_axis(&mut self, keys: &[Key]) -> usize {
         let sides = sides(keys);
-        for axis in 0..3 {
-            if sides[axis] > NOTABLY * sides[self.axis] {
-                self.axis = axis;
-            }
+        let longer = |longest, axis| if sides[axis] > sides[longest] { axis } else { longest };
+        let longest = (1..3).fold(0, longer);
+        if sides[longest] > NOTABLY * sides[self.axis] {
+            self.axis = longest;
         }
         self.axis
     }

@@ -52,9 +52,9 @@ pub struct Outcome {
     pub race: Race,
     /// Who took part.
     pub runners: Vec<Runner>,
-    /// The times, with a contender for each runner.
+    /// The times, with a contender for each runner, in their order, and perhaps one more.
     pub series: Series,
-    /// The contender that is the serial version without rendering, where that is timed.
+    /// The contender that is the serial version without rendering, where that is timed beside it.
     pub without_rendering: Option<usize>,
 }
 
@@ -105,16 +105,21 @@ impl Outcome {
         Some(1.0 - self.series.ratio(which, without, with)?.median)
     }
 
-    /// Adds a row for each runner and round.
+    /// Adds a row for each runner and round, and for the serial version without rendering, whose load is `none`.
     pub fn add_rounds(&self, table: &mut Table) {
         let Race { subject, load, frames, .. } = &self.race;
+        let runners =
+            self.runners.iter().enumerate().map(|(index, runner)| (index, load.name(), runner));
+        let without = self.without_rendering.map(|index| (index, "none", &Runner::SERIAL));
+        let contenders: Vec<_> = runners.chain(without).collect();
         for (number, (round, bad)) in
             self.series.rounds().iter().zip(self.series.marks()).enumerate()
         {
-            for (runner, seconds) in self.runners.iter().zip(&round.seconds) {
+            for &(index, load, runner) in &contenders {
+                let seconds = round.seconds[index];
                 table.push(&[
                     &subject.objects(),
-                    &load.name(),
+                    &load,
                     &runner.executor.name(),
                     &runner.threads,
                     &number,
@@ -304,8 +309,14 @@ pub(super) mod tests {
 
     #[test]
     fn a_row_is_of_its_own_rounds() {
+        let outcome = with_rendering([4.0, 6.0, 12.0], [3.0, 3.0, 6.0]);
+        let mut table = Outcome::rounds_table("rounds");
+        outcome.add_rounds(&mut table);
+        let seen = |row: usize| [1, 2, 4, 5].map(|column| table.rows[row][column].as_str());
+        assert_eq!(seen(2), ["stand-in", "serial", "1", "6.000000"]);
+        assert_eq!(seen(3), ["none", "serial", "1", "3.000000"]);
         let mut table = Outcome::summary_table("summary");
-        with_rendering([4.0, 6.0, 12.0], [3.0, 3.0, 6.0]).add_summary(&mut table);
+        outcome.add_summary(&mut table);
         let seen = |row: usize| [2, 7, 10, 12].map(|column| table.rows[row][column].as_str());
         assert_eq!(seen(0), ["0.5000", "all", "6.000000", "2.00"]);
         // The median of 3 and 2; by the median of seconds it would be 2.4.

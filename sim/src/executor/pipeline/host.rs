@@ -15,7 +15,7 @@ use dualframe_core::unit::UnitId;
 use super::overflow::Overflow;
 use crate::behavior::{Room, Workspace};
 use crate::block::Block;
-use crate::cost::{Cost, is_timed};
+use crate::cost::{TimedCost, is_timed};
 use crate::executor::outside::Outside;
 use crate::executor::{FrameRecord, OnFrame};
 use crate::interaction::{ContactBuffer, ContactRecord, Scratch};
@@ -159,7 +159,7 @@ pub(super) struct Screen<'s> {
     /// What rendering took of that frame so far, if it is timed.
     pub(super) took: Duration,
     /// What it takes in a frame, if it stays with one thread.
-    pub(super) rendering: &'s mut Cost,
+    pub(super) rendering: &'s mut TimedCost,
     /// Counts the frames that are done.
     pub(super) frame: &'s mut u64,
 }
@@ -176,7 +176,7 @@ impl Screen<'_> {
     /// Notes what a frame's rendering took, once it is swapped.
     fn note(&mut self, frame: u64) {
         if is_timed(frame) && self.renderer.is_bound() {
-            self.rendering.note(std::mem::take(&mut self.took));
+            self.rendering.add(frame, std::mem::take(&mut self.took));
         }
     }
 }

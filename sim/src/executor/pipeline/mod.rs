@@ -34,7 +34,7 @@ use super::outside::Outside;
 use super::{Executor, ExecutorError, FrameRecord, OnFrame, Refused, StageSeconds, world};
 use crate::block::Block;
 use crate::blocking::Grain;
-use crate::cost::Cost;
+use crate::cost::TimedCost;
 use crate::mailbox::Mailbox;
 use crate::message::Letter;
 use crate::object::{Object, ObjectId};
@@ -59,7 +59,7 @@ pub struct PipelineExecutor {
     team: Team,
     frame: u64,
     /// What rendering takes in a frame, where it stays with the calling thread.
-    rendering: Cost,
+    rendering: TimedCost,
     /// Objects' messages for the next frame.
     mail: Vec<(From, Parcel)>,
     outside: Outside,
@@ -98,7 +98,7 @@ impl PipelineExecutor {
             pool,
             team,
             frame,
-            rendering: Cost::default(),
+            rendering: TimedCost::default(),
             mail,
             outside,
             times: Vec::new(),

@@ -17,7 +17,6 @@ use super::memory::Limits;
 use super::team::Team;
 use crate::block::Block;
 use crate::blocking::{Blocking, FRAMES_PER_BLOCKING, Grain};
-use crate::cost::Cost;
 use crate::executor::on_panic::OnPanic;
 use crate::executor::world;
 use crate::pool::{Crew, Pool};
@@ -91,7 +90,7 @@ impl Regrouping<'_> {
     }
 
     /// Forms the blocks anew from where their objects are, if that is due before a frame. `rendering` is what
-    /// that takes in a frame, if the calling thread alone does it.
+    /// that takes in a frame, in seconds, if the calling thread alone does it.
     ///
     /// # Errors
     /// How many of them may meet, if the table of those that do is to grow first.
@@ -100,13 +99,13 @@ impl Regrouping<'_> {
         frame: u64,
         shared: &Shared<'_>,
         pipeline: &mut SimPipeline<'_, '_>,
-        rendering: Cost,
+        rendering: f32,
     ) -> Result<(), usize> {
         let due = self.blocking.as_mut().filter(|_| world::regroups_before(Grain::Spatial, frame));
         let Some((blocking, blocks)) = due else { return Ok(()) };
         blocks.extend(pipeline.objects_mut().map(|unit| mem::take(&mut unit.block)));
         // Home 0 is the calling thread's, which alone renders if anything is known of that.
-        blocking.deal(blocks, self.homes, rendering.seconds());
+        blocking.deal(blocks, self.homes, rendering);
         for (index, (unit, block)) in pipeline.objects_mut().zip(blocks.drain(..)).enumerate() {
             shared.register.locate(index, &block);
             unit.block = block;
@@ -193,7 +192,7 @@ impl<'s> Context<'s, '_> {
             let frame = self.shared.first_frame + done;
             let batch = (FRAMES_PER_BLOCKING - frame % FRAMES_PER_BLOCKING).min(frames - done);
             let Some(mut resting) = self.write(pipeline) else { break };
-            let rendering = kept.as_ref().map_or(Cost::default(), |screen| *screen.rendering);
+            let rendering = kept.as_ref().map_or(0.0, |screen| screen.rendering.seconds());
             if let Err(pairs) =
                 regrouping.regroup_before(frame, self.shared, &mut resting, rendering)
             {
@@ -219,7 +218,7 @@ impl<'s> Context<'s, '_> {
         end
     }
 
-    /// Waits until all others have left the batch; nothing if one of them panicked in it.
+    /// Waits until all others have left the batch; nothing if this thread panicked between two batches.
     fn write<'l, T>(self, lock: &'l RwLock<T>) -> Option<RwLockWriteGuard<'l, T>> {
         // They are about to: to sleep until they have would take longer.
         let mut guard = None;
