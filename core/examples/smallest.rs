@@ -1,6 +1,7 @@
 //! The smallest host: four bodies on a line push their neighbours apart.
 //!
-//! No heap: the tables are arrays on the stack, the workers are two scoped threads.
+//! The core needs no heap: its tables are arrays on the stack, its workers two scoped threads. Only what shows the places
+//! collects them in a list.
 
 use dualframe_core::contacts::{ContactSlot, Contacts, SegmentSlot};
 use dualframe_core::environment::{Environment, Pair};

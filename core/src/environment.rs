@@ -66,7 +66,8 @@ pub trait Environment {
     }
 
     /// Exact detection and, on a hit, response: results go to `contacts` or into `state`, never
-    /// into the objects. `a` and `b` are the same object for an interaction within a unit.
+    /// into the objects. `a` and `b` are the objects of the first and second of the pair's ends, and the same one for an
+    /// interaction within a unit.
     ///
     /// # Errors
     /// The host's; a full table of contacts among them.
@@ -104,7 +105,8 @@ pub trait Environment {
         renderer: &mut Self::Renderer,
     ) -> Result<(), Self::Error>;
 
-    /// Shows `frame`: every unit of it has been rendered, none of the next.
+    /// Shows `frame`: every unit of it has been rendered, none of the next. With several tokens it is called once, with
+    /// the renderer of whoever rendered the last unit.
     ///
     /// # Errors
     /// The host's; the frame counts as swapped all the same.

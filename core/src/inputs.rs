@@ -97,7 +97,8 @@ impl<'t, 'm, E: Environment + ?Sized> Inputs<'t, 'm, E> {
         })
     }
 
-    /// The next letter posted to this unit before this frame, in the order of [`From::is_before`].
+    /// The next letter posted to this unit before this frame, in the order of [`From::is_before`]. Those that are not
+    /// taken when the update returns, or fails, are dropped.
     pub fn next_letter(&mut self) -> Option<(From, E::Message)> {
         self.mail.next()
     }

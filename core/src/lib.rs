@@ -7,8 +7,8 @@
 //! (`verification/freestanding` is a program that links only if nothing in the core can panic or
 //! allocate, built with overflow checks off, as releases are). One [`worker::Worker::step`] does at
 //! most one work unit: its own cost is a bounded number of atomic operations (`PROTOCOL.md` §8), except
-//! that a compare-and-swap is retried when another worker succeeded at the same word meanwhile. A worker
-//! that is suspended anywhere holds back only the work unit in its hand, what it carries (72 others at
+//! that a compare-and-swap is retried when another worker, or a letter's poster, succeeded at the same word meanwhile.
+//! A worker that is suspended anywhere holds back only the work unit in its hand, what it carries (72 others at
 //! most, and the shared renderer while it has it) and calls for what it has queued in this step; in a swap it
 //! carries nothing and owes no call. One that is suspended while it waits may also hold back the call that it was
 //! woken by, and so the work unit that this was for, until another looks: workers that wait on one bell had better have
@@ -21,7 +21,8 @@
 //! | [`pipeline::Pipeline::finished`], [`frame`](pipeline::Pipeline::frame) | wait-free: a load | yes |
 //! | [`pipeline::Pipeline::post`] | lock-free; rings nobody; a letter of an earlier pipeline in the same memory is dropped | yes |
 //! | [`pipeline::Pipeline::token`], [`storage::Static::take`] | lock-free | yes |
-//! | [`worker::Worker::step`], dropping one | lock-free beside the callbacks; calls [`wait::Waiting::wake`] | if that and the callbacks may be |
+//! | [`worker::Worker::step`] | lock-free beside the callbacks, of which a unit that enters may ask one for each that came before (`PROTOCOL.md` §8); calls [`wait::Waiting::wake`] | if that and the callbacks may be |
+//! | [`worker::Worker::release`], dropping one | lock-free; queues what it carries; calls [`wait::Waiting::wake`] | if that may be |
 //! | the step that opens a frame; with [`frame::Entry::AfterSwap`] the one that swaps | takes up every unit once | as any step |
 //! | [`worker::Worker::wait`] | the host's | no |
 //!

@@ -36,7 +36,8 @@ pub struct Config {
     pub broad_phase: BroadPhase,
     /// How far consecutive frames overlap.
     pub entry: Entry,
-    /// How many workers may render at once, if the renderer is not shared; with 0 no frame is ever swapped.
+    /// How many workers may render at once, each with a renderer of its own, of which one swaps the frame, if the
+    /// renderer is not shared; with 0 no frame is ever swapped.
     pub tokens: u32,
     /// How many homes the units are shared out to: 1 to [`MOST_HOMES`], the nearest is taken;
     /// usually one for each worker. A worker does the units of its own home first, in the order of their
@@ -94,14 +95,15 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     /// Lets `frames` more frames run.
     ///
     /// # Errors
-    /// [`StillRunning`] if the frames let run before have not all been swapped.
+    /// [`StillRunning`] if the frames let run before have not all been swapped: always after [`Self::run_without_end`].
     pub fn run(&mut self, frames: u32) -> Result<(), StillRunning> {
         self.run_up_to(Some(Frame(self.frame().0.wrapping_add(frames))))
     }
 
     /// Lets frames run without end: for a machine that never stops, or whose pipeline is shared for good, so that
     /// nobody can let more frames run. Who wants an end steps no worker any more; those that sleep are woken by the
-    /// host, whose [`Waiting::sleep`] may return at any time.
+    /// host, whose [`Waiting::sleep`] may return at any time. It is for good: another run takes another pipeline over
+    /// the memory.
     ///
     /// # Errors
     /// [`StillRunning`] if the frames let run before have not all been swapped.
@@ -187,7 +189,9 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
 
     /// Posts a letter from outside the callbacks: a device, an interrupt handler, a user
     /// interface. It is processed by `to`'s first update in a later frame than the one now open, or sooner where
-    /// this thread does not know yet that another one has opened that.
+    /// this thread does not know yet that another one has opened that. Nobody else, no unit either, may post under the
+    /// same `sender` meanwhile: letters of the same sender and place in the sequence come in an order that depends on
+    /// the schedule.
     ///
     /// # Errors
     /// [`Rejected`] with the letter if all letters are under way, or if there is no unit `to`.
@@ -201,8 +205,8 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         self.tables.post(to, stamp, from, message)
     }
 
-    /// Gives every unit another home, counted round: to balance them, say. At first they are shared out
-    /// in the order of their numbers, as many to each home.
+    /// Gives every unit another home, counted round: to balance them, say; also within a run. At first they are shared
+    /// out in the order of their numbers, as many to each home.
     pub fn set_homes(&mut self, home_of: impl Fn(UnitId) -> u32) {
         self.tables.set_homes(home_of);
     }

@@ -3,7 +3,8 @@
 use crate::frame::Frame;
 use crate::unit::Work;
 
-/// Watches one worker. The default does nothing and costs nothing.
+/// Watches one worker. The default does nothing and costs nothing. A frame's last rendering includes its swap, and so what
+/// the host waits for in that; calls for sleepers come after a work unit's end, but for those ahead of a swap.
 pub trait Probe {
     /// The worker turns to `work`, which belongs to `frame`.
     #[inline]

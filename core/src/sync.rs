@@ -195,7 +195,7 @@ sites! {
     DISPLAY_ADVANCE = Release;
     /// Acquire: pairs with `DISPLAY_ADVANCE`.
     DISPLAY_LOAD = Acquire;
-    /// Relaxed: changed by exclusive access only, between two runs.
+    /// Relaxed: changed by exclusive access only, while there is no worker.
     HOME = Relaxed;
     /// Relaxed: a hint. Who misses it carries on with what it has, and looks again at its next step.
     HUNGRY = Relaxed;
@@ -220,7 +220,7 @@ sites! {
     FENCE_PUT_BACK = SeqCst;
     /// Relaxed: how many tokens or readers are left; re-validated by the CAS that follows.
     COUNT_LOOK = Relaxed;
-    /// Acquire and Release: the token's renderer moves from holder to holder.
+    /// Acquire and Release: a returned token's last use is before its reissue. Its renderer moves within it.
     TOKEN_COUNT = AcqRel;
     /// Relaxed: a hint, and the CAS after it decides; or looked at after `FENCE_SLEEP`, as queues are.
     SHARED_LOOK = Relaxed;

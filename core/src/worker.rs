@@ -60,7 +60,8 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         Ok(())
     }
 
-    /// Takes the token away, to give it to another worker.
+    /// Takes the token away, to give it to another worker. As one that is dropped does, the worker queues all that it
+    /// carries, puts a shared renderer back and wakes whoever that is for.
     pub fn release(&mut self) -> Option<Token<'p, E::Renderer>> {
         // A carried rendering stays behind for the next holder.
         self.carry.leave();

@@ -18,8 +18,9 @@ use dualframe_core::frame::Entry;
 use dualframe_core::inbox::{From, LetterSlot};
 use dualframe_core::latest::Latest;
 use dualframe_core::pipeline::{BroadPhase, Config, Pipeline};
+use dualframe_core::probe::NoProbe;
 use dualframe_core::ring::{IndexRing, QueueSlot};
-use dualframe_core::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
+use dualframe_core::storage::{InteractionSlot, Memory, Static, UnitSlot, queue_slots};
 use dualframe_core::unit::UnitId;
 use dualframe_core::wait::{Bell, Epoch, Waiting};
 use dualframe_core::worker::{Step, Worker};
@@ -58,7 +59,7 @@ fn all() -> bool {
             }
         }
     }
-    latest::<3>() && latest::<16>() && latest::<256>() && ring()
+    latest::<3>() && latest::<16>() && latest::<256>() && ring() && once()
 }
 
 fn pipeline(config: Config) -> Result<(), Failure> {
@@ -151,10 +152,14 @@ fn endless(pipeline: &mut Pipeline<'_, Ve, Awake>) -> Result<(), Failure> {
     pipeline.run_without_end()?;
     let first = pipeline.frame();
     let token = pipeline.token(0).map_err(|(_, full)| full)?;
-    let mut worker = pipeline.worker();
+    let mut worker = pipeline.worker().probed(NoProbe);
     worker.hold(token).map_err(|_| Failure::Wrong)?;
     while pipeline.frame().0.wrapping_sub(first.0) < black_box(FRAMES) {
         turn(&mut worker)?;
+        black_box(worker.probe());
+        if worker.renderer().is_none() {
+            return Err(Failure::Wrong);
+        }
     }
     if pipeline.finished() { Err(Failure::Wrong) } else { Ok(()) }
 }
@@ -180,6 +185,12 @@ fn post(pipeline: &Pipeline<'_, Ve, Awake>) -> Result<(), Failure> {
         Err(rejected) if rejected.full.table == Table::Units => Ok(()),
         _ => Err(Failure::Wrong),
     }
+}
+
+/// A static that is handed out once.
+fn once() -> bool {
+    static ONCE: Static<u32> = Static::new(0);
+    black_box(&ONCE).take().is_some() && black_box(&ONCE).take().is_none()
 }
 
 /// A latest-value cell, written and read in turns.
