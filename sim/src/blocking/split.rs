@@ -61,13 +61,14 @@ pub(super) struct Division {
 }
 
 impl Division {
-    /// Along the longest side, or the last one while that is not notably shorter.
+    /// Along the same side as last time, or the first that is notably longer, or one notably longer than that: of sides
+    /// that are nearly equal always the same.
     pub(super) fn find_axis(&mut self, keys: &[Key]) -> usize {
         let sides = sides(keys);
-        let longer = |longest, axis| if sides[axis] > sides[longest] { axis } else { longest };
-        let longest = (1..3).fold(0, longer);
-        if sides[longest] > NOTABLY * sides[self.axis] {
-            self.axis = longest;
+        for axis in 0..3 {
+            if sides[axis] > NOTABLY * sides[self.axis] {
+                self.axis = axis;
+            }
         }
         self.axis
     }
