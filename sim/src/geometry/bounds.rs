@@ -1,6 +1,6 @@
 //! Axis-aligned bounding boxes.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 /// An axis-aligned bounding box, in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,8 +29,10 @@ impl Bounds {
     #[must_use]
     #[inline]
     pub fn overlaps(&self, other: &Self) -> bool {
-        // One branch: in which direction boxes are apart cannot be foretold.
-        (self.min.cmple(other.max) & other.min.cmple(self.max)).all()
+        // One branch: in which direction boxes are apart cannot be foretold. Of `Vec3`, whose comparisons are numbers one by
+        // one, the compiler makes three.
+        let [a, b] = [self, other].map(|bounds| [bounds.min, bounds.max].map(Vec3A::from));
+        (a[0].cmple(b[1]) & b[0].cmple(a[1])).all()
     }
 
     /// The smallest box that holds all of these points, in metres.
