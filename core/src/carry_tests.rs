@@ -93,7 +93,10 @@ fn with_pipeline<'c, R>(
     with_units(&mut [(); 2].map(UnitSlot::new), calls, tokens, use_it)
 }
 
-/// The same of these units, three at most.
+/// As many units as a test has at most.
+const MOST_UNITS: usize = 3 * RENDERED_AT_ONCE;
+
+/// The same of these units.
 fn with_units<'c, R>(
     units: &mut [UnitSlot<()>],
     calls: &'c Calls,
@@ -106,7 +109,7 @@ fn with_units<'c, R>(
         contacts: &mut [const { ContactSlot::new() }; 2],
         segments: &mut [const { SegmentSlot::new() }; 2],
         letters: &mut [const { LetterSlot::new() }],
-        queues: &mut [const { QueueSlot::new() }; queue_slots(3, 2, 1, 1)],
+        queues: &mut [const { QueueSlot::new() }; queue_slots(MOST_UNITS, 2, 1, 1)],
     };
     let config = Config { tokens, ..Config::default() };
     use_it(Pipeline::new(memory, config, calls).unwrap_or_else(|error| panic!("{error}")))
@@ -255,6 +258,29 @@ fn who_has_the_renderer_queues_none_of_what_it_keeps() {
         for _ in 0..2 {
             assert_eq!(other.step(&void), Ok(Step::Worked(Stage::Render)));
             assert!(!pipeline.render_visible());
+        }
+        assert!(pipeline.finished());
+    });
+}
+
+/// It would be fetched from another core each time.
+#[test]
+fn who_has_many_updates_at_home_asks_for_the_renderer_for_several_at_once() {
+    let calls = Calls::default();
+    let void = Void { calls: &calls, before_entry: AtomicU32::new(0) };
+    with_units(&mut [(); MOST_UNITS].map(UnitSlot::new), &calls, 1, |mut pipeline| {
+        assert!(pipeline.share(()).is_ok());
+        assert_eq!(pipeline.run(1), Ok(()));
+        let mut worker = pipeline.worker();
+        let mut expect = |stage, times| {
+            for _ in 0..times {
+                assert_eq!(worker.step(&void), Ok(Step::Worked(stage)));
+            }
+        };
+        expect(Stage::BroadPhase, MOST_UNITS);
+        for at_once in [RENDERED_AT_ONCE, RENDERED_AT_ONCE, 1, 1, 1, 1] {
+            expect(Stage::Update, at_once);
+            expect(Stage::Render, at_once);
         }
         assert!(pipeline.finished());
     });

@@ -69,7 +69,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
                 if env.interacts_within(object) {
                     meet(unit, out);
                 }
-                self.tables.gathering.arrivals.arrive(unit.0, self.next_frame(unit), |earlier| {
+                self.tables.arrivals.arrive(unit.0, self.next_frame(unit), |earlier| {
                     let earlier = UnitId(earlier);
                     let met = &self.tables.unit(earlier).object;
                     if met.with(|object_met| env.broad_phase(object, object_met)) {
@@ -238,7 +238,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         slot.pending.arm(if seeded!(RenderingNotAwaited) { 1 } else { 2 });
         slot.frame.store(frame.next().0, site::FRAME_TAG);
         let on_display = self.window.display() == frame || seeded!(RenderedBeforeSwap);
-        if on_display && (holder || out.takes_renderer()) {
+        if on_display && (holder || out.takes_renderer_for_one_more()) {
             out.emit(Work::Render(unit));
         } else if !(on_display && out.keeps(unit)) {
             out.queue(Work::Render(unit));

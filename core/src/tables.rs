@@ -84,12 +84,10 @@ pub(crate) struct Queues<'m> {
 }
 
 /// The frame being gathered. Whoever enters it writes to what is counted here: it is in one cache line,
-/// which one worker after the other fetches once.
+/// which one worker after the other fetches once; nothing is there that is only read, or it would be fetched twice.
 #[derive(Debug)]
-pub(crate) struct Gathering<'m> {
-    /// Units that have entered it.
-    pub(crate) arrivals: Arrivals<'m>,
-    /// Units that have not. The last one opens the frame: updates of it may start, and no update of
+pub(crate) struct Gathering {
+    /// Units that have not entered it. The last one opens the frame: updates of it may start, and no update of
     /// the frame before is left.
     pub(crate) gate: Countdown,
     /// Candidate slots claimed in each frame in flight (spatial broad phase).
@@ -103,7 +101,9 @@ pub(crate) struct Tables<'m, E: Environment + ?Sized> {
     pub(crate) pools: Pools<'m, E::Contact>,
     pub(crate) post: Post<'m, E::Message>,
     pub(crate) queues: Queues<'m>,
-    pub(crate) gathering: CachePadded<Gathering<'m>>,
+    /// Units that have entered the frame being gathered.
+    pub(crate) arrivals: Arrivals<'m>,
+    pub(crate) gathering: CachePadded<Gathering>,
 }
 
 /// The largest table whose indices leave room for `NONE` and for doubling.
@@ -163,8 +163,8 @@ impl<'m, E: Environment> Tables<'m, E> {
             render: [ring(units.len())?, ring(units.len())?],
         };
         let post = Post::new(letters, slots(letters.len()))?;
+        let arrivals = Arrivals::new(rest.get_mut(..units.len()).unwrap_or_default());
         let gathering = Gathering {
-            arrivals: Arrivals::new(rest.get_mut(..units.len()).unwrap_or_default()),
             gate: Countdown::new(units.len() as u32),
             found: [Room::new(), Room::new()],
         };
@@ -174,6 +174,7 @@ impl<'m, E: Environment> Tables<'m, E> {
             pools: Pools::new(contacts, segments),
             post,
             queues,
+            arrivals,
             gathering: CachePadded::new(gathering),
         };
         let homes = u64::from(tables.queues.homes.count().get());
