@@ -3,15 +3,18 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Takes so many steps, each of which needs the one before (xorshift, Marsaglia 2003).
-pub(super) fn spin(steps: u64) {
-    let mut state = black_box(0x9e37_79b9_7f4a_7c15_u64);
+/// What [`spin`] may begin with: any number but 0, for which every step would be the same.
+pub(super) const SEED: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// Takes so many steps from a state to the one that it returns, each of which needs the one before (xorshift, Marsaglia
+/// 2003). So does the first one of a further call with that state; a core begins what needs nothing of it meanwhile.
+pub(super) fn spin(steps: u64, mut state: u64) -> u64 {
     for _ in 0..steps {
         state ^= state << 13;
         state ^= state >> 7;
         state ^= state << 17;
     }
-    black_box(state);
+    black_box(state)
 }
 
 /// Numbers that [`divide`] works on, enough of them that none waits for the one before.
