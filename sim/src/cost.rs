@@ -90,11 +90,23 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_first_frame_of_a_blocking_is_not_timed() {
+        let timed: Vec<u64> = (32..64).filter(|&frame| is_timed(frame)).collect();
+        assert_eq!(timed, [36, 40, 44, 48, 52, 56, 60]);
+        assert_eq!(timed.len(), TIMINGS);
+    }
+
+    #[test]
     fn what_is_noted_is_the_median_of_what_was_timed() {
+        let timed = (0..3 * FRAMES_PER_NOTE).filter(|&frame| is_timed(frame));
         let (mut timings, mut noted) = (Timings::default(), Vec::new());
-        for frame in (0..3 * FRAMES_PER_NOTE).filter(|&frame| is_timed(frame)) {
-            // Every third one is interrupted.
-            let took = if frame % 3 == 0 { 1_000 } else { 10 + frame / FRAMES_PER_NOTE };
+        for frame in timed {
+            let took = match frame % FRAMES_PER_NOTE {
+                8 => 1,
+                // What is interrupted.
+                12 | 24 => 1_000,
+                _ => 10 + frame / FRAMES_PER_NOTE,
+            };
             noted.extend(timings.add(frame, Duration::from_micros(took)).map(|took| (frame, took)));
         }
         let micros = |(frame, took)| (frame, Duration::from_micros(took));

@@ -243,6 +243,8 @@ mod tests {
         assert_eq!(first_of([8; 16]), (16, 2 * HALF));
         assert_eq!(first_of([8; 18]), (16, 2 * HALF));
         assert_eq!(first_of([8; 7]), (7, HALF));
+        assert_eq!(first_of([1; 5]), (5, HALF), "a turn is cheaper than five bodies by themselves");
+        assert_eq!(first_of([2, 1, 1, 1, 1]), (1, HALF), "but not if most lanes wait for one");
         for others in [15, 31, 100] {
             let one_long = std::iter::once(1_000).chain((0..others).map(|_| 1));
             assert_eq!(first_of(one_long), (1, HALF), "{others} others");

@@ -35,6 +35,12 @@ fn dealt(micros: &[u64], homes: u32, besides: u64) -> Vec<Vec<(u64, usize)>> {
     given
 }
 
+#[test]
+fn objects_are_shared_out_by_fours_where_lanes_stay_empty_anyhow() {
+    let shares = [64, 640, 1_000, 1_024, 2_816, 2_880].map(|objects| share(objects, 64));
+    assert_eq!(shares, [1, HALF, HALF, FEW, FEW, HALF]);
+}
+
 /// What others ask of a block: where its objects are and what they cost, its box, and who may touch.
 fn asked(block: &Block) -> impl PartialEq + Debug + use<> {
     let mut found = Vec::new();
