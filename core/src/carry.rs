@@ -25,8 +25,8 @@ const RESERVE: usize = MOST_CARRIED / 8;
 
 /// Renderings that a worker keeps at most until nobody else has the shared renderer. Usually 8; beyond it they are queued.
 const MOST_KEPT: usize = MOST_CARRIED.div_ceil(4);
-/// As many renderings as a worker asks for the shared renderer for at once, while more updates wait at its home. Usually
-/// 4: to fetch it, and what it writes, from another core takes longer than to render what is light.
+/// As many renderings as a worker asks for the shared renderer for at once, while more updates of that frame wait at its
+/// home. Usually 4: to fetch it, and what it writes, from another core takes longer than to render what is light.
 const RENDERED_AT_ONCE: usize = MOST_KEPT.div_ceil(2);
 
 /// Carry-over (§4.2): outputs are carried as long as nobody is hungry; and how many sleepers what was
@@ -250,13 +250,17 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         None
     }
 
-    /// Whether so many renderings are worth asking for the shared renderer.
+    /// Whether so many renderings are worth asking for the shared renderer: while many updates of their frame wait at home,
+    /// only several are. Of the last ones none is to wait for others, for somebody may be waiting for the frame by then.
     #[inline]
     fn is_enough(&self, renderings: usize) -> bool {
+        let Pipeline { window, tables, .. } = self.pipeline;
+        let more_come = || {
+            let update = &tables.queues.homes.at(self.home).update;
+            window.open() == window.display() && update.looks_longer_than(RENDERED_AT_ONCE)
+        };
         let enough = if self.renders_shared { 1 } else { RENDERED_AT_ONCE };
-        let update = || &self.pipeline.tables.queues.homes.at(self.home).update;
-        // Of the last ones none is to wait for others: somebody may be waiting for the frame by then.
-        renderings >= enough || (renderings > 0 && !update().looks_longer_than(RENDERED_AT_ONCE))
+        renderings >= enough || (renderings > 0 && !more_come())
     }
 
     /// Takes the shared renderer if there is something to render, and else has it no longer.

@@ -285,3 +285,29 @@ fn who_has_many_updates_at_home_asks_for_the_renderer_for_several_at_once() {
         assert!(pipeline.finished());
     });
 }
+
+/// The swap waits for them.
+#[test]
+fn renderings_of_a_frame_that_is_updated_wait_for_no_others() {
+    let calls = Calls::default();
+    let void = Void { calls: &calls, before_entry: AtomicU32::new(0) };
+    with_units(&mut [(); MOST_UNITS].map(UnitSlot::new), &calls, 1, |mut pipeline| {
+        assert!(pipeline.share(()).is_ok());
+        assert_eq!(pipeline.run(2), Ok(()));
+        let mut worker = pipeline.worker();
+        let mut step = || worker.step(&void).unwrap_or_else(|error| panic!("{error}"));
+        let last = RENDERED_AT_ONCE - 1;
+        let mut updated = 0;
+        while updated < MOST_UNITS - last {
+            updated += usize::from(step() == Step::Worked(Stage::Update));
+        }
+        assert_eq!([step(), step()], [Stage::Render, Stage::BroadPhase].map(Step::Worked));
+        assert!(pipeline.shared.take(), "as if another worker did");
+        for _ in 0..last {
+            assert_eq!([step(), step()], [Stage::Update, Stage::BroadPhase].map(Step::Worked));
+        }
+        pipeline.shared.put_back();
+        assert!(pipeline.tables.queues.homes.at(0).update.looks_longer_than(RENDERED_AT_ONCE));
+        assert_eq!(step(), Step::Worked(Stage::Render));
+    });
+}
