@@ -23,11 +23,9 @@ const MOST_CARRIED: usize = 1;
 /// nothing is left but updates that others are at, for which the frame's opening waits. Usually 4.
 const RESERVE: usize = MOST_CARRIED / 8;
 
-/// Renderings that a worker keeps at most until nobody else has the shared renderer. Usually 8; beyond it they are queued.
+/// Renderings that a worker keeps at most until nobody else has the shared renderer. Usually 8: it asks for that ahead of
+/// every step; beyond it they are queued.
 const MOST_KEPT: usize = MOST_CARRIED.div_ceil(4);
-/// As many renderings as a worker asks for the shared renderer for at once, while more updates of that frame wait at its
-/// home. Usually 4: to fetch it, and what it writes, from another core takes longer than to render what is light.
-const RENDERED_AT_ONCE: usize = MOST_KEPT.div_ceil(2);
 
 /// Carry-over (§4.2): outputs are carried as long as nobody is hungry; and how many sleepers what was
 /// queued is to wake.
@@ -116,12 +114,6 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
     pub(crate) fn takes_renderer(&mut self) -> bool {
         self.renders_shared = self.renders_shared || self.pipeline.shared.take();
         self.renders_shared
-    }
-
-    /// Whether this worker has the shared renderer from now on, to render one unit more than it keeps.
-    #[inline]
-    pub(crate) fn takes_renderer_for_one_more(&mut self) -> bool {
-        self.is_enough(self.kept.len() + 1) && self.takes_renderer()
     }
 
     /// Keeps the rendering of `unit`, which this worker has updated for the frame on display, until nobody else has the
@@ -250,25 +242,12 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         None
     }
 
-    /// Whether so many renderings are worth asking for the shared renderer: while many updates of their frame wait at home,
-    /// only several are. Of the last ones none is to wait for others, for somebody may be waiting for the frame by then.
-    #[inline]
-    fn is_enough(&self, renderings: usize) -> bool {
-        let Pipeline { window, tables, .. } = self.pipeline;
-        let more_come = || {
-            let update = &tables.queues.homes.at(self.home).update;
-            window.open() == window.display() && update.looks_longer_than(RENDERED_AT_ONCE)
-        };
-        let enough = if self.renders_shared { 1 } else { RENDERED_AT_ONCE };
-        renderings >= enough || (renderings > 0 && !more_come())
-    }
-
     /// Takes the shared renderer if there is something to render, and else has it no longer.
     #[inline]
     pub(crate) fn share_renderer(&mut self) {
         if self.pipeline.shared.is_offered()
             && (self.has_rendering()
-                || self.is_enough(self.kept.len())
+                || !self.kept.is_empty()
                 || self.pipeline.render_visible()
                 || self.puts_renderer_back_and_sees())
         {

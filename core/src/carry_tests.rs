@@ -93,10 +93,7 @@ fn with_pipeline<'c, R>(
     with_units(&mut [(); 2].map(UnitSlot::new), calls, tokens, use_it)
 }
 
-/// As many units as a test has at most.
-const MOST_UNITS: usize = 3 * RENDERED_AT_ONCE;
-
-/// The same of these units.
+/// The same of these units, three at most.
 fn with_units<'c, R>(
     units: &mut [UnitSlot<()>],
     calls: &'c Calls,
@@ -109,7 +106,7 @@ fn with_units<'c, R>(
         contacts: &mut [const { ContactSlot::new() }; 2],
         segments: &mut [const { SegmentSlot::new() }; 2],
         letters: &mut [const { LetterSlot::new() }],
-        queues: &mut [const { QueueSlot::new() }; queue_slots(MOST_UNITS, 2, 1, 1)],
+        queues: &mut [const { QueueSlot::new() }; queue_slots(3, 2, 1, 1)],
     };
     let config = Config { tokens, ..Config::default() };
     use_it(Pipeline::new(memory, config, calls).unwrap_or_else(|error| panic!("{error}")))
@@ -260,54 +257,5 @@ fn who_has_the_renderer_queues_none_of_what_it_keeps() {
             assert!(!pipeline.render_visible());
         }
         assert!(pipeline.finished());
-    });
-}
-
-/// It would be fetched from another core each time.
-#[test]
-fn who_has_many_updates_at_home_asks_for_the_renderer_for_several_at_once() {
-    let calls = Calls::default();
-    let void = Void { calls: &calls, before_entry: AtomicU32::new(0) };
-    with_units(&mut [(); MOST_UNITS].map(UnitSlot::new), &calls, 1, |mut pipeline| {
-        assert!(pipeline.share(()).is_ok());
-        assert_eq!(pipeline.run(1), Ok(()));
-        let mut worker = pipeline.worker();
-        let mut expect = |stage, times| {
-            for _ in 0..times {
-                assert_eq!(worker.step(&void), Ok(Step::Worked(stage)));
-            }
-        };
-        expect(Stage::BroadPhase, MOST_UNITS);
-        for at_once in [RENDERED_AT_ONCE, RENDERED_AT_ONCE, 1, 1, 1, 1] {
-            expect(Stage::Update, at_once);
-            expect(Stage::Render, at_once);
-        }
-        assert!(pipeline.finished());
-    });
-}
-
-/// The swap waits for them.
-#[test]
-fn renderings_of_a_frame_that_is_updated_wait_for_no_others() {
-    let calls = Calls::default();
-    let void = Void { calls: &calls, before_entry: AtomicU32::new(0) };
-    with_units(&mut [(); MOST_UNITS].map(UnitSlot::new), &calls, 1, |mut pipeline| {
-        assert!(pipeline.share(()).is_ok());
-        assert_eq!(pipeline.run(2), Ok(()));
-        let mut worker = pipeline.worker();
-        let mut step = || worker.step(&void).unwrap_or_else(|error| panic!("{error}"));
-        let last = RENDERED_AT_ONCE - 1;
-        let mut updated = 0;
-        while updated < MOST_UNITS - last {
-            updated += usize::from(step() == Step::Worked(Stage::Update));
-        }
-        assert_eq!([step(), step()], [Stage::Render, Stage::BroadPhase].map(Step::Worked));
-        assert!(pipeline.shared.take(), "as if another worker did");
-        for _ in 0..last {
-            assert_eq!([step(), step()], [Stage::Update, Stage::BroadPhase].map(Step::Worked));
-        }
-        pipeline.shared.put_back();
-        assert!(pipeline.tables.queues.homes.at(0).update.looks_longer_than(RENDERED_AT_ONCE));
-        assert_eq!(step(), Step::Worked(Stage::Render));
     });
 }

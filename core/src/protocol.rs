@@ -238,7 +238,7 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         slot.pending.arm(if seeded!(RenderingNotAwaited) { 1 } else { 2 });
         slot.frame.store(frame.next().0, site::FRAME_TAG);
         let on_display = self.window.display() == frame || seeded!(RenderedBeforeSwap);
-        if on_display && (holder || out.takes_renderer_for_one_more()) {
+        if on_display && (holder || out.takes_renderer()) {
             out.emit(Work::Render(unit));
         } else if !(on_display && out.keeps(unit)) {
             out.queue(Work::Render(unit));

@@ -178,16 +178,6 @@ impl<'m> IndexRing<'m> {
         let word = self.slot(head).load(site::RING_CELL_LOOK);
         self.laps_ahead(head, word) == 1
     }
-
-    /// Whether more than `count` indices look to be in the ring: a hint, stale as soon as it is given. As many as it has
-    /// slots are never more.
-    #[inline]
-    pub fn looks_longer_than(&self, count: usize) -> bool {
-        let head = self.head.load(site::RING_HEAD_LOAD);
-        let place = head.wrapping_add(count);
-        let word = self.slot(place).load(site::RING_CELL_LOOK);
-        self.laps_ahead(place, word) == 0
-    }
 }
 
 #[cfg(all(test, not(loom)))]
@@ -215,9 +205,6 @@ mod tests {
             let ring =
                 IndexRing::holding(count, &mut slots).unwrap_or_else(|full| panic!("{full}"));
             assert_eq!(ring.looks_empty(), count == 0);
-            for fewer in 0..9 {
-                assert_eq!(ring.looks_longer_than(fewer), fewer < count, "{count} in all");
-            }
             for _lap in 0..3 {
                 for index in 0..count as u32 {
                     assert_eq!(ring.pop(), Some(index), "of {count}");
