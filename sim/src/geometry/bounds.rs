@@ -29,8 +29,8 @@ impl Bounds {
     #[must_use]
     #[inline]
     pub fn overlaps(&self, other: &Self) -> bool {
-        // One branch: in which direction boxes are apart cannot be foretold. Of `Vec3`, whose comparisons are numbers one by
-        // one, the compiler makes three.
+        // One branch: in which direction boxes are apart cannot be foretold. Of a comparison of `Vec3`s the compiler
+        // makes three.
         let [a, b] = [self, other].map(|bounds| [bounds.min, bounds.max].map(Vec3A::from));
         (a[0].cmple(b[1]) & b[0].cmple(a[1])).all()
     }
