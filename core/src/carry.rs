@@ -4,10 +4,11 @@
 use heapless::{Deque, Vec};
 
 use crate::environment::Environment;
+use crate::homes::Home;
 use crate::pipeline::Pipeline;
 use crate::stage::{Stage, Stages};
 use crate::sync::{fence, seeded, site};
-use crate::tables::Home;
+
 use crate::unit::{InteractionId, UnitId, Work};
 use crate::wait::Waiting;
 
@@ -97,6 +98,11 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
     pub(crate) fn queue(&mut self, work: Work) {
         self.pipeline.push(work);
         *self.calls_for(Stage::of(work)) += 1;
+    }
+
+    /// So many units are there to come for.
+    pub(crate) fn offered(&mut self, units: u32) {
+        self.queued += units;
     }
 
     /// Renderings that were queued already can be done now, by other holders if there are any.
@@ -193,6 +199,9 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         let oldest = Work::Interact(id);
         // Updates wait for the open frame's; for the next frame's nobody does before it is open.
         let is_awaited = self.pipeline.frame_of(oldest) == self.pipeline.window.open();
+        if is_awaited && self.works.is_empty() {
+            self.come_home();
+        }
         let before_updates = is_awaited || self.interactions.len() > RESERVE;
         let other = match self.works.last() {
             Some(Work::Update(_)) | None if before_updates => None,
@@ -208,11 +217,20 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         id.map(Work::Interact)
     }
 
-    /// An update that is queued at this worker's home.
+    /// Comes for units of this worker's home, up to the first that is free: who then ends what another of them waits for
+    /// is the last, and updates it with what it has just read in its core's cache.
+    fn come_home(&mut self) {
+        let home = self.pipeline.tables.queues.homes.at(self.home);
+        if let Some(unit) = self.come(home) {
+            self.emit(Work::Update(unit));
+        }
+    }
+
+    /// An update at this worker's home.
     #[inline]
     fn pop_update(&mut self) -> Option<Work> {
         let home = self.pipeline.tables.queues.homes.at(self.home);
-        if home.update.looks_empty() { None } else { self.pop(home, Stage::Update) }
+        self.pop(home, Stage::Update)
     }
 
     /// A work unit of `stage` that is queued at a home or for everybody.
@@ -222,9 +240,23 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         match stage {
             Stage::BroadPhase => home.enter.pop().map(|unit| Work::Enter(UnitId(unit))),
             Stage::Interaction => interact.pop().map(|id| Work::Interact(InteractionId(id))),
-            Stage::Update => home.update.pop().map(|unit| Work::Update(UnitId(unit))),
+            Stage::Update => {
+                let unit = self.come(home).or_else(|| home.update.pop().map(UnitId));
+                unit.map(Work::Update)
+            }
             Stage::Render => self.pop_render(),
         }
+    }
+
+    /// Comes for units of the frame that is open, and has the first that waits for nothing else: others are updated by
+    /// whoever ends what they wait for.
+    #[inline]
+    fn come(&self, home: &Home<'_>) -> Option<UnitId> {
+        let is_free =
+            |unit| self.pipeline.tables.unit(unit).pending.arrive() || seeded!(UpdatesWhenOpened);
+        // Once round at most, so that a step is bounded.
+        let mut comes = (0..home.opened.len()).map_while(|_| home.opened.take().map(UnitId));
+        comes.find(|&unit| is_free(unit))
     }
 
     /// A unit of the frame on display. Another holder may have swapped since `display` was read, and the

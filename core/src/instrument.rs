@@ -105,6 +105,8 @@ faults! {
     GoesOnWithRenderer;
     /// Lost wake-up: who queues a rendering, or leaves one behind, calls holders, where anyone could do it.
     RenderingCallsHolders;
+    /// Whoever comes for a unit of the open frame updates it, whatever else it waits for.
+    UpdatesWhenOpened;
     /// The gate is armed again after the frame's updates were let go.
     GateArmedLate;
     /// The countdown of renderings is armed again after the next frame is on display.

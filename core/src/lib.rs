@@ -23,7 +23,7 @@
 //! | [`pipeline::Pipeline::token`], [`storage::Static::take`] | lock-free | yes |
 //! | [`worker::Worker::step`] | lock-free beside the callbacks, of which a unit that enters may ask one for each that came before (`PROTOCOL.md` §8); calls [`wait::Waiting::wake`] | if that and the callbacks may be |
 //! | [`worker::Worker::release`], dropping one | lock-free; queues what it carries; calls [`wait::Waiting::wake`] | if that may be |
-//! | the step that opens a frame; with [`frame::Entry::AfterSwap`] the one that swaps | takes up every unit once | as any step |
+//! | a step that looks for updates in an open frame; with [`frame::Entry::AfterSwap`] the one that swaps | takes up every unit once at most | as any step |
 //! | [`worker::Worker::wait`] | the host's | no |
 //!
 //! # Targets
@@ -48,7 +48,7 @@
 //! | §5.1 four stages (Fig. 6) | [`stage`], [`pipeline`] |
 //! | §5.1, §5.3 render token | [`token`] |
 //! | §5.3 thread migration (Fig. 8) | [`migrate`], [`worker`] |
-//! | §5.4 synchronisation | [`countdown`], [`arrivals`] |
+//! | §5.4 synchronisation | [`countdown`], [`arrivals`], [`offer`] |
 //! | §5.5 consecutive frames | [`frame`] |
 //! | §5.6 temp buffers, preallocation | [`contacts`], [`storage`] |
 //! | §6.1 threads come and go | [`worker`], [`wait`] |
@@ -79,6 +79,7 @@ pub mod countdown;
 pub mod environment;
 pub mod error;
 pub mod frame;
+mod homes;
 pub mod inbox;
 pub mod inputs;
 #[cfg(loom)]
@@ -86,6 +87,7 @@ pub mod instrument;
 pub mod latest;
 mod list;
 pub mod migrate;
+pub mod offer;
 mod pending;
 pub mod pipeline;
 pub mod probe;

@@ -4,18 +4,19 @@
 use crate::environment::Environment;
 use crate::error::{NotShared, SetupError, StillRunning, Table, TableFull};
 use crate::frame::{Entry, Frame, Window};
+use crate::homes::Home;
 use crate::inbox::{From, Rejected};
 use crate::probe::NoProbe;
 use crate::stage::{Stage, Stages};
 use crate::storage::Memory;
 use crate::sync::site;
-use crate::tables::{Home, Tables};
+use crate::tables::Tables;
 use crate::token::{Shared, Token, TokenOffice};
 use crate::unit::{UnitId, Work};
 use crate::wait::{Bells, Spin, Waiting};
 use crate::worker::Worker;
 
-pub use crate::tables::MOST_HOMES;
+pub use crate::homes::MOST_HOMES;
 
 /// Which pairs the broad phase tests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -246,7 +247,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         Stages::NONE
             .with_if(Stage::BroadPhase, !home.enter.looks_empty())
             .with_if(Stage::Interaction, !self.tables.queues.interact.looks_empty())
-            .with_if(Stage::Update, !home.update.looks_empty())
+            .with_if(Stage::Update, !home.has_no_updates())
             .with_if(Stage::Render, holder && self.render_visible())
     }
 

@@ -147,8 +147,8 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         }
     }
 
-    /// `unit` has entered its frame and made its tests. The last one opens the frame: whatever
-    /// has no interactions left, and is rendered, can be updated.
+    /// `unit` has entered its frame and made its tests. The last one opens the frame: whoever comes for a unit may
+    /// update it, if it has no interactions left and is rendered.
     fn leave_gate(&self, unit: UnitId, out: &mut Carry<'_, '_, E, W>) {
         // Read before leaving: afterwards the unit may be updated by someone else.
         let frame = self.next_frame(unit);
@@ -163,12 +163,8 @@ impl<E: Environment, W: Waiting> Pipeline<'_, E, W> {
         if seeded!(UpdatesAfterOwnTests) {
             return;
         }
-        // Queued, not carried: in the order of their numbers, and for whoever comes first.
-        for unit in (0..self.tables.units.len() as u32).map(UnitId) {
-            if self.tables.unit(unit).pending.arrive() {
-                out.queue(Work::Update(unit));
-            }
-        }
+        self.tables.queues.homes.iter().for_each(|home| home.opened.offer());
+        out.offered(self.tables.units.len() as u32);
         if seeded!(GateArmedLate) {
             self.opened(frame);
         }

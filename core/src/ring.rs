@@ -12,7 +12,7 @@ use crate::error::{Table, TableFull};
 use crate::storage::at;
 use crate::sync::{AtomicWord, CachePadded, const_fn, seeded, site, spin_hint};
 
-/// Memory of one slot of a queue, or of the list of arrivals.
+/// Memory of one slot of a queue, of the list of arrivals, or of an offer.
 #[derive(Debug)]
 pub struct QueueSlot(pub(crate) AtomicWord);
 
@@ -22,6 +22,11 @@ impl QueueSlot {
         pub const fn new() -> Self {
             Self(AtomicWord::new(0))
         }
+    }
+
+    /// Puts `index` in.
+    pub fn set(&mut self, index: u32) {
+        self.0.store(index as usize, site::EXCLUSIVE);
     }
 }
 

@@ -203,7 +203,8 @@ pub(crate) unsafe fn at<T>(table: &[T], index: usize) -> &T {
 pub const fn queue_slots(units: usize, interactions: usize, letters: usize, homes: usize) -> usize {
     let homes = if homes == 0 { 1 } else { homes };
     let rings = 2 * (homes + 1) * slots_for(units) + slots_for(interactions) + slots_for(letters);
-    rings + units
+    // The lists of arrivals and of homes' units.
+    rings + 2 * units
 }
 
 /// Hands a `static` out exactly once, for hosts without a heap.

@@ -195,6 +195,14 @@ sites! {
     DISPLAY_ADVANCE = Release;
     /// Acquire: pairs with `DISPLAY_ADVANCE`.
     DISPLAY_LOAD = Acquire;
+    /// Release: whoever opens a frame publishes what its gate acquired.
+    OFFER_SET = Release;
+    /// Relaxed: re-validated by the CAS that follows; or a hint, a sleeper's behind `FENCE_SLEEP`.
+    OFFER_LOOK = Relaxed;
+    /// Acquire: pairs with `OFFER_SET`, whose release sequence the CASes of others continue.
+    OFFER_TAKE = Acquire;
+    /// Relaxed: changed by exclusive access only, as `HOME`.
+    OFFER_READ = Relaxed;
     /// Relaxed: changed by exclusive access only, while there is no worker.
     HOME = Relaxed;
     /// Relaxed: a hint. Who misses it carries on with what it has, and looks again at its next step.

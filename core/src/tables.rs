@@ -1,13 +1,12 @@
 //! The pipeline's tables: units, interactions, results, letters, and the queues between stages.
 
-use ::core::num::NonZeroU32;
-
 use crate::arrivals::Arrivals;
 use crate::contacts::{Pools, Room};
 use crate::countdown::Countdown;
 use crate::environment::Environment;
 use crate::error::{SetupError, Table, TableFull};
 use crate::frame::Frame;
+use crate::homes::{Home, Homes, Queues};
 use crate::inbox::{From, Inbox, Post, Rejected};
 use crate::list;
 use crate::pending::Pending;
@@ -15,73 +14,6 @@ use crate::ring::{IndexRing, QueueSlot, slots_for};
 use crate::storage::{Chain, InteractionSlot, Memory, UnitSlot, at, queue_slots};
 use crate::sync::{CachePadded, site};
 use crate::unit::{InteractionId, NONE, UnitId};
-
-/// The most homes that units are shared out to; workers beyond their number share them.
-#[cfg(not(loom))]
-pub const MOST_HOMES: usize = 16;
-/// As many as models use: loom's stacks are small.
-#[cfg(loom)]
-pub const MOST_HOMES: usize = 2;
-
-/// The queues of the units of one home.
-#[derive(Debug)]
-pub(crate) struct Home<'m> {
-    pub(crate) enter: IndexRing<'m>,
-    pub(crate) update: IndexRing<'m>,
-}
-
-/// All homes, of which there is at least one.
-#[derive(Debug)]
-pub(crate) struct Homes<'m> {
-    first: Home<'m>,
-    others: [Option<Home<'m>>; MOST_HOMES - 1],
-}
-
-impl<'m> Homes<'m> {
-    fn new(
-        count: usize,
-        mut home: impl FnMut() -> Result<Home<'m>, TableFull>,
-    ) -> Result<Self, TableFull> {
-        let mut homes = Self { first: home()?, others: [const { None }; MOST_HOMES - 1] };
-        for other in homes.others.iter_mut().take(count.saturating_sub(1)) {
-            *other = Some(home()?);
-        }
-        Ok(homes)
-    }
-
-    /// The number of homes.
-    pub(crate) fn count(&self) -> NonZeroU32 {
-        NonZeroU32::MIN.saturating_add(self.iter().skip(1).count() as u32)
-    }
-
-    fn iter(&self) -> impl Iterator<Item = &Home<'m>> {
-        ::core::iter::once(&self.first).chain(self.others.iter().map_while(Option::as_ref))
-    }
-
-    /// A home that there is, by its number.
-    #[inline]
-    pub(crate) fn at(&self, number: u32) -> &Home<'m> {
-        let others = self.others.get((number as usize).wrapping_sub(1));
-        others.and_then(Option::as_ref).unwrap_or(&self.first)
-    }
-
-    /// All homes, the one of this number before the others.
-    #[inline]
-    pub(crate) fn from(&self, number: u32) -> impl Iterator<Item = &Home<'m>> {
-        let own = self.at(number);
-        let others = self.iter().filter(move |&home| !::core::ptr::eq(home, own));
-        ::core::iter::once(own).chain(others)
-    }
-}
-
-/// Queues carry only what nobody has in hand (§4.2).
-#[derive(Debug)]
-pub(crate) struct Queues<'m> {
-    pub(crate) homes: Homes<'m>,
-    pub(crate) interact: IndexRing<'m>,
-    /// One for each frame in flight (§5.5).
-    pub(crate) render: [IndexRing<'m>; 2],
-}
 
 /// The frame being gathered. Whoever enters it writes to what is counted here: it is in one cache line,
 /// which one worker after the other fetches once; nothing is there that is only read, or it would be fetched twice.
@@ -103,6 +35,8 @@ pub(crate) struct Tables<'m, E: Environment + ?Sized> {
     pub(crate) queues: Queues<'m>,
     /// Units that have entered the frame being gathered.
     pub(crate) arrivals: Arrivals<'m>,
+    /// The units of each home, one home's after another's.
+    order: &'m [QueueSlot],
     pub(crate) gathering: CachePadded<Gathering>,
 }
 
@@ -154,16 +88,16 @@ impl<'m, E: Environment> Tables<'m, E> {
             slots
         };
         let mut ring = |indices| IndexRing::new(slots(indices));
-        let homes = Homes::new(homes, || {
-            Ok(Home { enter: ring(units.len())?, update: ring(units.len())? })
-        })?;
+        let homes = Homes::new(homes, || Ok(Home::new(ring(units.len())?, ring(units.len())?)))?;
         let queues = Queues {
             homes,
             interact: ring(interactions.len())?,
             render: [ring(units.len())?, ring(units.len())?],
         };
         let post = Post::new(letters, slots(letters.len()))?;
-        let arrivals = Arrivals::new(rest.get_mut(..units.len()).unwrap_or_default());
+        let (cells, rest) = rest.split_at_mut_checked(units.len()).unwrap_or_default();
+        let arrivals = Arrivals::new(cells);
+        let order = rest.get(..units.len()).unwrap_or_default();
         let gathering = Gathering {
             gate: Countdown::new(units.len() as u32),
             found: [Room::new(), Room::new()],
@@ -175,6 +109,7 @@ impl<'m, E: Environment> Tables<'m, E> {
             post,
             queues,
             arrivals,
+            order,
             gathering: CachePadded::new(gathering),
         };
         let homes = u64::from(tables.queues.homes.count().get());
@@ -218,9 +153,27 @@ impl<'m, E: Environment + ?Sized> Tables<'m, E> {
 
     /// Gives every unit a home, counted round. Nobody else may use the tables meanwhile.
     pub(crate) fn set_homes(&mut self, home_of: impl Fn(UnitId) -> u32) {
+        self.come_for_all();
         let homes = self.queues.homes.count();
         for (index, unit) in self.units.iter().enumerate() {
             unit.home.store(home_of(UnitId(index as u32)) % homes, site::EXCLUSIVE);
+        }
+        let units = self.units;
+        let home_of = |unit: UnitId| {
+            units.get(unit.index()).map_or(0, |unit| unit.home.load(site::EXCLUSIVE))
+        };
+        self.queues.homes.settle(self.order, home_of);
+    }
+
+    /// Comes for every unit of an open frame that nobody has come for yet.
+    fn come_for_all(&self) {
+        for home in self.queues.homes.iter() {
+            while let Some(unit) = home.opened.take() {
+                if self.unit(UnitId(unit)).pending.arrive() {
+                    // A queue has a slot for every index of its table.
+                    let _fits = home.update.push(unit);
+                }
+            }
         }
     }
 

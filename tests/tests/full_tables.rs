@@ -308,8 +308,8 @@ fn memory_that_does_not_fit() {
     let good = Sizes::spatial(5, 20, 10, 3);
     assert_eq!(good.refused(), None);
     let needed = queue_slots(5, 20, 3, 1);
-    // Two queues of the home and two of rendering; interactions; free letters; arrivals.
-    assert_eq!(needed, 4 * 8 + 32 + 4 + 5);
+    // Two queues of the home and two of rendering; interactions; free letters; arrivals and the home's units.
+    assert_eq!(needed, 4 * 8 + 32 + 4 + 2 * 5);
     assert_eq!(queue_slots(5, 20, 3, 3), needed + 2 * 2 * 8, "two for each home");
     assert_eq!(queue_slots(5, 20, 3, 0), needed, "there is always one home");
     for queues in [0, needed - 1] {

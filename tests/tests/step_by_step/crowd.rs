@@ -176,6 +176,11 @@ pub(crate) fn hold<'p>(pipeline: &'p Machine<'_, '_>, worker: &mut Worker<'p, '_
     worker.hold(token).map_err(drop).expect("this pipeline's");
 }
 
+/// Somebody comes for all units of the open frame, which all wait for something else, and leaves.
+pub(crate) fn come_for_all(pipeline: &Machine<'_, '_>) {
+    assert_eq!(pipeline.worker().step(&NEAR), IDLE);
+}
+
 pub(crate) fn finish(pipeline: &Machine<'_, '_>, env: &Crowd) {
     let mut worker = pipeline.worker();
     hold(pipeline, &mut worker);

@@ -16,7 +16,7 @@ use dualframe_tests::watchdog;
 
 use crowd::{
     BREAKS, Crowd, ENTERED, FAR, IDLE, INTERACTED, Log, NEAR, Notes, RENDERED, UPDATED, alone,
-    error, finish, hold, units, with, with_notes,
+    come_for_all, error, finish, hold, units, with, with_notes,
 };
 
 #[test]
@@ -35,6 +35,34 @@ fn a_worker_does_the_units_of_its_home_first_and_then_helps() {
             }
         }
     });
+}
+
+/// A unit that nobody has come for yet is not lost, and none is come for twice.
+#[test]
+fn homes_change_within_an_open_frame() {
+    for (env, steps) in [(&FAR, 6), (&FAR, 7), (&FAR, 9), (&NEAR, 6 + 15), (&NEAR, 6 + 15 + 1)] {
+        with(6, 3, 1, |mut pipeline, _| {
+            pipeline.run(2).expect("at rest");
+            let mut log = Log::default();
+            let mut worker = pipeline.worker().probed(&mut log);
+            (0..steps).for_each(|_| assert_ne!(worker.step(env), IDLE));
+            drop(worker);
+            pipeline.set_homes(|unit| 7 - unit.0);
+            let mut worker = pipeline.worker();
+            hold(&pipeline, &mut worker);
+            let mut worker = worker.probed(&mut log);
+            while !pipeline.finished() {
+                assert_ne!(worker.step(env), IDLE, "after {steps} steps");
+            }
+            drop(worker);
+            for frame in [0, 1].map(Frame) {
+                let of_frame = log.begun.iter().filter(|(_, of)| *of == frame);
+                let [_, mut updated] = units(&Vec::from_iter(of_frame.map(|&(work, _)| work)));
+                updated.sort_unstable();
+                assert_eq!(updated, [0, 1, 2, 3, 4, 5], "{frame:?}, after {steps} steps");
+            }
+        });
+    }
 }
 
 #[test]
@@ -158,6 +186,7 @@ fn a_worker_leaves_what_it_carries() {
         pipeline.run(1).expect("at rest");
         let mut a = pipeline.worker();
         assert_eq!([a.step(&NEAR), a.step(&NEAR)], [ENTERED, ENTERED]);
+        come_for_all(&pipeline);
         let mut b = pipeline.worker();
         assert!(!b.has_cause_to_wake());
         drop(a);
@@ -289,7 +318,9 @@ fn nobody_wakes_without_cause() {
         assert_eq!([a.step(&NEAR), a.step(&NEAR)], [ENTERED, ENTERED]);
         hold(&pipeline, &mut b);
         assert!(a.has_cause_to_wake(), "it carries the interaction");
-        assert!(!b.has_cause_to_wake());
+        assert!(b.has_cause_to_wake(), "units are to be come for");
+        come_for_all(&pipeline);
+        assert!(!b.has_cause_to_wake(), "they wait for the interaction");
         a.wait();
         b.wait();
         assert_eq!(notes.slept(), [true], "the holder slept, on the holders' bell");

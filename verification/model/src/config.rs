@@ -61,6 +61,8 @@ pub enum Bug {
     TokenDoubled,
     /// A worker sleeps with renderings that it keeps until the shared renderer is free.
     SleepsWithRendering,
+    /// Whoever comes for a unit of the open frame updates it, whatever else it waits for.
+    UpdatedWhenOpened,
     /// Whoever puts the shared renderer back does not look for renderings once more.
     NotLookedAgain,
     /// Whoever took the shared renderer, and finds that all is rendered, goes on to other work with it.

@@ -8,7 +8,7 @@ use crate::config::{Bug, Config};
 use crate::state::{At, Rule, State, Worker};
 use crate::step::{Act, Step};
 use crate::waiting::Call;
-use crate::work::Work;
+use crate::work::{Work, indices};
 
 /// The protocol, in one configuration.
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ impl Protocol {
         let config = &self.0;
         let me = &state.workers[worker as usize];
         let mut may = |act| acts.push((worker, act));
-        let carries: &[bool] = if config.sleep { &[false, true] } else { &[false] };
+        let carries = self.carries();
         match me.at {
             At::Gone => {}
             At::Outside if state.finished(config) => {}
@@ -50,7 +50,6 @@ impl Protocol {
             }
             At::Swapping => may(Act::Call { carry: false }),
             At::Found(..)
-            | At::Opening(..)
             | At::Interacted(_)
             | At::Passing { .. }
             | At::Advancing(_)
@@ -68,6 +67,11 @@ impl Protocol {
         }
     }
 
+    /// Whether what is set free may be carried, or queued.
+    fn carries(&self) -> &'static [bool] {
+        if self.0.sleep { &[false, true] } else { &[false] }
+    }
+
     fn awake(&self, state: &State, me: &Worker, may: &mut impl FnMut(Act)) {
         let config = &self.0;
         if state.finished(config) {
@@ -76,7 +80,11 @@ impl Protocol {
         self.by_host(state, me, may);
         if !config.shared {
             self.next_work(state, me, may);
-        } else if config.sleep || me.holds || state.work(me, state.tokens > 0).next().is_some() {
+        } else if config.sleep
+            || me.holds
+            || state.opened != 0
+            || state.work(me, state.tokens > 0).next().is_some()
+        {
             may(Act::Turn);
         }
     }
@@ -93,12 +101,15 @@ impl Protocol {
         let all = state.work(me, me.holds).chain(seen);
         let work: BTreeSet<Work> = all.filter(|work| !renders || work.is_rendering()).collect();
         work.iter().for_each(|&work| may(Act::Take(work)));
+        for unit in indices(u64::from(state.opened)).map(|unit| unit as u8) {
+            self.carries().iter().for_each(|&carry| may(Act::Come { unit, carry }));
+        }
         // What it keeps it queues where somebody is hungry, or before it goes to another home.
         if me.at == At::GoingOn && !me.holds && me.carried.iter().any(Work::is_rendering) {
             may(Act::Share);
         }
         let awaits = config.sleep || me.at == At::GoingOn;
-        if awaits && work.is_empty() && !me.offers {
+        if awaits && work.is_empty() && state.opened == 0 && !me.offers {
             may(Act::Go { carry: false });
         }
     }

@@ -190,6 +190,11 @@ impl Replay {
             let act = *self.acts(&state, worker as u8).first()?;
             state = self.model.next_state(&state, act)?;
         }
+        // Whoever comes for a unit of an open frame only frees it; here it is the one who never does anything else.
+        while state.opened != 0 {
+            let unit = state.opened.trailing_zeros() as u8;
+            state = self.model.next_state(&state, (0, Act::Come { unit, carry: false }))?;
+        }
         let config = &self.model.0;
         let sound = state.broken.is_none() && state.access(config) && state.tokens(config);
         sound.then_some(state)

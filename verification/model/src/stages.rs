@@ -69,11 +69,16 @@ impl Step<'_> {
         }
     }
 
-    /// One thing less that `unit`'s update waits for.
-    fn ready(&mut self, unit: u8) {
+    /// One thing less that `unit`'s update waits for; whether that was the last.
+    pub(crate) fn take_off(&mut self, unit: u8) -> bool {
         let pending = &mut self.state.unit(unit).pending;
         *pending = pending.wrapping_sub(1);
-        if *pending == 0 {
+        *pending == 0
+    }
+
+    /// One thing less that `unit`'s update waits for, which this worker sets free if that was the last.
+    fn ready(&mut self, unit: u8) {
+        if self.take_off(unit) {
             self.emit(Work::Update(unit));
         }
     }
@@ -273,7 +278,9 @@ impl Step<'_> {
     }
 
     fn open(&mut self, unit: u8, then: Then) {
-        self.ready(unit);
+        self.claim(Rule::ExactlyOnce, self.state.opened >> unit & 1 == 0);
+        self.state.opened |= 1 << unit;
+        self.count_queued(Work::Update(unit));
         if unit + 1 < self.config.units {
             self.goes_to(At::Opening(unit + 1, then));
             return;

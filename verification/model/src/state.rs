@@ -73,7 +73,7 @@ pub enum At {
     AtGate(u8, Then),
     /// Counts these pairs late (seeded bugs only).
     CountingLate(u64, Then),
-    /// Takes the frame's opening off all units' countdowns, from this one on.
+    /// Lets whoever comes take the frame's opening off units' countdowns, from this one on.
     Opening(u8, Then),
     /// In the callback of an interaction.
     Interacting(u8),
@@ -217,6 +217,8 @@ pub struct State {
     pub arrived: u64,
     /// Candidates whose interaction has not ended, a bit each.
     pub found: u64,
+    /// Units of the open frame for which nobody has come yet, a bit each.
+    pub opened: u8,
     /// Units that have not left the gate.
     pub gate: u8,
     /// Units of the frame on display that are not rendered.
@@ -252,6 +254,7 @@ impl State {
             queue,
             arrived: 0,
             found: 0,
+            opened: 0,
             gate: config.units,
             renders: config.units,
             display: 0,
@@ -277,6 +280,11 @@ impl State {
 
     pub(crate) fn unit(&mut self, unit: u8) -> &mut Unit {
         &mut self.units[unit as usize]
+    }
+
+    /// Whether `worker` would find something in the queues, or a unit to come for.
+    pub(crate) fn anything_is_visible(&self, holder: bool) -> bool {
+        self.opened != 0 || self.visible(holder).next().is_some()
     }
 
     /// What `worker` would find in the queues.
@@ -369,9 +377,9 @@ impl State {
 
 impl fmt::Display for State {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { queue, gate, renders, display, tokens, .. } = self;
+        let Self { queue, opened, gate, renders, display, tokens, .. } = self;
         writeln!(f, "    queued {queue:?}; frame {display} is on display, {renders} to render;")?;
-        writeln!(f, "    {gate} before the gate; {tokens} tokens lie about")?;
+        writeln!(f, "    {gate} before the gate; {tokens} tokens lie about; opened {opened:b}")?;
         for (number, unit) in self.units.iter().enumerate() {
             let Unit { frame, pending, rendered } = unit;
             writeln!(

@@ -19,6 +19,13 @@ pub enum Act {
     Share,
     /// It looks for renderings: it is about to take the shared renderer, or to put it back.
     Turn,
+    /// It comes for a unit of the open frame, and updates it, or lets it go, if it waits for nothing else.
+    Come {
+        /// The unit.
+        unit: u8,
+        /// Carry.
+        carry: bool,
+    },
     /// It begins a work unit.
     Take(Work),
     /// It tests a pair, which is a candidate or not.
@@ -56,7 +63,10 @@ pub(crate) struct Step<'c> {
 impl<'c> Step<'c> {
     /// The state after worker `number` has done `act`, which must be possible.
     pub(crate) fn made(config: &'c Config, state: &State, number: usize, act: Act) -> State {
-        let carry = matches!(act, Act::Call { carry: true } | Act::Go { carry: true });
+        let carry = matches!(
+            act,
+            Act::Call { carry: true } | Act::Go { carry: true } | Act::Come { carry: true, .. }
+        );
         let mut step = Self { config, state: state.clone(), number, carry };
         match act {
             Act::Join => step.worker().at = At::Awake,
@@ -65,6 +75,7 @@ impl<'c> Step<'c> {
             Act::Hold => step.hold(),
             Act::Share => step.share(),
             Act::Turn => step.turn(),
+            Act::Come { unit, .. } => step.come(unit),
             Act::Take(work) => step.take(work),
             Act::Test { pair, near } => step.test(pair, near),
             Act::Call { .. } => step.call(),
@@ -133,6 +144,15 @@ impl<'c> Step<'c> {
         let carry = std::mem::replace(&mut self.carry, false);
         self.emit(work);
         self.carry = carry;
+    }
+
+    /// Comes for `unit`, whose frame is open.
+    fn come(&mut self, unit: u8) {
+        self.state.opened &= !(1 << unit);
+        if self.take_off(unit) || self.config.has(Bug::UpdatedWhenOpened) {
+            self.emit(Work::Update(unit));
+        }
+        self.announce_between();
     }
 
     fn take(&mut self, work: Work) {

@@ -16,9 +16,13 @@ impl Step<'_> {
     }
 
     pub(crate) fn share(&mut self) {
-        let at = self.at();
         self.shed();
-        if at == At::GoingOn {
+        self.announce_between();
+    }
+
+    /// Announces what is queued ahead of a work unit.
+    pub(crate) fn announce_between(&mut self) {
+        if self.at() == At::GoingOn {
             self.announce(At::Calling, At::GoingOn);
         } else {
             self.end();
@@ -87,7 +91,7 @@ impl Step<'_> {
     /// Has looked for work, for renderings too if it `renders`.
     fn looked(&self, rung: bool, renders: bool) -> At {
         let has_cause_to_wake =
-            self.state.visible(renders).next().is_some() || self.state.finished(self.config);
+            self.state.anything_is_visible(renders) || self.state.finished(self.config);
         if has_cause_to_wake && !self.config.has(Bug::NoSecondLook) {
             At::Returning
         } else {
@@ -147,7 +151,7 @@ impl Call {
         if matches!(worker.at, At::Leaving { .. }) && !config.has(Bug::LeaverSwallowsCall) {
             let called = if config.renderings_call_holders() { &mut renders } else { &mut any };
             *called += usize::from(state.rendering_is_visible());
-            any += usize::from(state.visible(false).next().is_some());
+            any += usize::from(state.anything_is_visible(false));
         }
         if config.has(Bug::WrongBell) {
             (any, renders) = (any + renders, 0);

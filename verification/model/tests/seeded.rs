@@ -91,6 +91,7 @@ seeded! {
     opened_by_last_arriver: OpenedByLastArriver in awake() => property::of(Rule::Order);
     no_gate: NoGate in awake() => property::of(Rule::Order);
     arrivals_kept: ArrivalsKept in awake() => property::of(Rule::Order);
+    updated_when_opened: UpdatedWhenOpened in awake() => property::of(Rule::Order);
     gate_armed_late: GateArmedLate in awake() => property::PROGRESS;
     swap_by_last_but_one: SwapByLastButOne in awake() => property::of(Rule::Swap);
     displayed_before_swap: DisplayedBeforeSwap in Config { tokens: 2, ..awake() }

@@ -3,7 +3,7 @@
 
 use crate::models::hunt::{Kill, each, kill};
 use crate::models::{
-    Model, arrivals, bell, countdown, inbox, latest, pipeline, ring, shared, token,
+    Model, arrivals, bell, countdown, inbox, latest, offer, pipeline, ring, shared, token,
 };
 use dualframe_core_model::instrument::weaken;
 use dualframe_core_model::sync::{Site, site};
@@ -19,6 +19,7 @@ fn suspects(name: &str) -> &'static [Model] {
         "RING" => ring::ALL,
         "COUNTDOWN" => countdown::ALL,
         "ARRIVALS" => arrivals::ALL,
+        "OFFER" => offer::ALL,
         "MAIL" => inbox::ALL,
         "LATEST" | "READERS" => latest::ALL,
         "BELL" | "FENCE" => bell::ALL,

@@ -35,6 +35,7 @@ fn killer(fault: Fault) -> &'static str {
         NotLookedAgain => "shared::busy_after_it",
         GoesOnWithRenderer => "shared::all_rendered_meanwhile",
         RenderingCallsHolders => "shared::leaver_calls",
+        UpdatesWhenOpened => "pipeline::spatial_after_update",
         GateArmedLate => "pipeline::solitary_unit",
         RendersArmedLate => "pipeline::two_holders_at_a_swap",
         TestedTwice => "pipeline::pairwise_after_update",

@@ -214,10 +214,11 @@ fn leaver_passes_it_on() {
         let screen: Screen = lend(Guarded::new(0));
         // Never dropped: it stays where it is.
         let suspended = &mut **lend(ManuallyDrop::new(pipeline.worker()));
-        // Both units enter; their interaction is carried.
+        // Both units enter; their interaction is carried. Somebody comes for them, but they wait for that.
         for _ in 0..2 {
             assert_ne!(step(suspended, world), Step::Idle);
         }
+        assert_eq!(step(&mut pipeline.worker(), world), Step::Idle);
         let interact: Role<Step> = Box::new(move || step(suspended, world));
         let leave: Role<Step> = Box::new(move || {
             *lock(&waiting.leaver) = Some(loom::thread::current().id());

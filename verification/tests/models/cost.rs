@@ -77,18 +77,25 @@ const POP: u32 = 3;
 const EMIT: u32 = 3 + PUSH;
 /// One fence, two bells.
 const ANNOUNCE: u32 = 5;
-/// Looks at all queues, and pops from the one chosen; a rendering of another frame goes back.
-const LOOK: u32 = 9 + (2 + POP + 1 + PUSH);
+/// Looks at all queues and an offer, and pops from the one chosen; a rendering of another frame goes back.
+const LOOK: u32 = 10 + (2 + POP + 1 + PUSH);
+/// Coming for a unit of an open frame.
+const COME: u32 = 4;
 /// Rendering is looked for first, then anything at home and elsewhere, and at most four times at each home
-/// what was seen may be gone.
-const FIND: u32 = 13 + HOMES as u32 * 4 * LOOK;
+/// what was seen may be gone; so may its units be that are to be come for. One at home may be passed on.
+fn find(units: u32) -> u32 {
+    13 + 4 * (HOMES as u32 * LOOK + units * COME) + EMIT
+}
 /// A shared renderer is put back, and a rendering looked for behind a fence.
 const PUT_BACK: u32 = 1 + 1 + 3;
 /// It is taken if a rendering is seen; or put back if none is, and taken again if one is seen all the same. It is put
 /// back where others have rendered what was seen.
 const SHARE_RENDERER: u32 = 3 + PUT_BACK + 2 + PUT_BACK;
-/// Where nobody takes away what was seen.
-const FIND_ALONE: u32 = 3 + (HOMES as u32 - 1) * 9 + LOOK;
+/// Where nobody takes away what was seen; a rendering is found without coming for units.
+fn find_alone(units: u32, stage: Stage) -> u32 {
+    let comes = if stage == Stage::Render { 0 } else { units * COME + EMIT };
+    3 + (HOMES as u32 - 1) * 10 + LOOK + comes
+}
 /// Once round a loop whose word another thread changed.
 const RETRY: u32 = 4;
 
@@ -102,10 +109,11 @@ fn sort(n: u32, each: u32) -> u32 {
 ///
 /// Each unit has a modelled interaction with each other. `opens`: whether it opens a frame, where nobody interferes; `None` where others do, and it may.
 fn bound(units: u32, did: Did, opens: Option<bool>) -> u32 {
-    let find = if opens.is_some() { FIND_ALONE } else { SHARE_RENDERER + FIND };
+    let find =
+        if opens.is_some() { find_alone(units, did.stage) } else { SHARE_RENDERER + find(units) };
     let let_go = CARRIED * (1 + PUSH) + ANNOUNCE;
     let share = 2 + let_go;
-    let gate = |opens| if opens { 8 + units * (1 + EMIT) } else { 2 };
+    let gate = |opens| if opens { 8 + HOMES as u32 } else { 2 };
     // A solitary unit leaves the gate where others are passed on; there is none where one is alone.
     let pass_on = EMIT + if opens.is_none() { gate(true) } else { 0 };
     let work = match did.stage {

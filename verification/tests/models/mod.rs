@@ -9,6 +9,7 @@ pub(crate) mod countdown;
 pub(crate) mod hunt;
 pub(crate) mod inbox;
 pub(crate) mod latest;
+pub(crate) mod offer;
 pub(crate) mod pipeline;
 pub(crate) mod ring;
 pub(crate) mod shared;
@@ -155,6 +156,7 @@ pub(crate) fn all() -> impl Iterator<Item = Model> {
         ring::ALL,
         countdown::ALL,
         arrivals::ALL,
+        offer::ALL,
         inbox::ALL,
         latest::ALL,
         bell::ALL,

@@ -290,6 +290,8 @@ fn half_rendered(frames: u32) -> (&'static Piped<Spin>, &'static World, Screen, 
     let screen: Screen = lend(Guarded::new(0));
     let mut worker = Moving::at(pipeline, 0);
     worker.step_until(world, Updated(1, 0));
+    // Somebody has come for both units of the frame that this opened: from now on they wait for their renderings only.
+    assert_eq!(Moving::at(pipeline, 0).step(world), Step::Idle);
     worker.hold(pipeline, screen);
     worker.step_until(world, Rendered(0, 0));
     (pipeline, world, screen, worker)
