@@ -8,7 +8,6 @@ use crate::homes::Home;
 use crate::pipeline::Pipeline;
 use crate::stage::{Stage, Stages};
 use crate::sync::{fence, seeded, site};
-
 use crate::unit::{InteractionId, UnitId, Work};
 use crate::wait::Waiting;
 
