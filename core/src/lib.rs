@@ -8,8 +8,8 @@
 //! allocate, built with overflow checks off, as releases are). One [`worker::Worker::step`] does at
 //! most one work unit: its own cost is a bounded number of atomic operations (`PROTOCOL.md` §8), except
 //! that a compare-and-swap is retried when another worker, or a letter's poster, succeeded at the same word meanwhile.
-//! A worker that is suspended anywhere holds back only the work unit in its hand, what it carries (72 others at
-//! most, and the shared renderer while it has it) and calls for what it has queued in this step; in a swap it
+//! A worker that is suspended anywhere holds back only the work unit in its hand or that it looks at, what it carries (72
+//! others at most, and the shared renderer while it has it) and calls for what it has queued in this step; in a swap it
 //! carries nothing and owes no call. One that is suspended while it waits may also hold back the call that it was
 //! woken by, and so the work unit that this was for, until another looks: workers that wait on one bell had better have
 //! like priorities, and none may be deleted there. Every queue stays usable. A full table is a returned error
@@ -23,7 +23,7 @@
 //! | [`pipeline::Pipeline::token`], [`storage::Static::take`] | lock-free | yes |
 //! | [`worker::Worker::step`] | lock-free beside the callbacks, of which a unit that enters may ask one for each that came before (`PROTOCOL.md` §8); calls [`wait::Waiting::wake`] | if that and the callbacks may be |
 //! | [`worker::Worker::release`], dropping one | lock-free; queues what it carries; calls [`wait::Waiting::wake`] | if that may be |
-//! | a step that looks for updates in an open frame; with [`frame::Entry::AfterSwap`] the one that swaps | takes up every unit once at most | as any step |
+//! | a step that looks for updates in an open frame; with [`frame::Entry::AfterSwap`] the one that swaps | takes up every unit, each once a frame at most | as any step |
 //! | [`worker::Worker::wait`] | the host's | no |
 //!
 //! # Targets

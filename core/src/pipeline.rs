@@ -207,7 +207,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
     }
 
     /// Gives every unit another home, counted round: to balance them, say; also within a run. At first they are shared
-    /// out in the order of their numbers, as many to each home.
+    /// out in the order of their numbers, as many to each home. It looks at each unit once for each home.
     pub fn set_homes(&mut self, home_of: impl Fn(UnitId) -> u32) {
         self.tables.set_homes(home_of);
     }

@@ -23,7 +23,7 @@ impl Protocol {
         let config = &self.0;
         let me = &state.workers[worker as usize];
         let mut may = |act| acts.push((worker, act));
-        let carries = self.carries();
+        let carries: &[bool] = if config.sleep { &[false, true] } else { &[false] };
         match me.at {
             At::Gone => {}
             At::Outside if state.finished(config) => {}
@@ -50,6 +50,7 @@ impl Protocol {
             }
             At::Swapping => may(Act::Call { carry: false }),
             At::Found(..)
+            | At::Coming { .. }
             | At::Interacted(_)
             | At::Passing { .. }
             | At::Advancing(_)
@@ -65,11 +66,6 @@ impl Protocol {
             At::Asleep => {}
             _ => may(Act::Go { carry: false }),
         }
-    }
-
-    /// Whether what is set free may be carried, or queued.
-    fn carries(&self) -> &'static [bool] {
-        if self.0.sleep { &[false, true] } else { &[false] }
     }
 
     fn awake(&self, state: &State, me: &Worker, may: &mut impl FnMut(Act)) {
@@ -101,15 +97,15 @@ impl Protocol {
         let all = state.work(me, me.holds).chain(seen);
         let work: BTreeSet<Work> = all.filter(|work| !renders || work.is_rendering()).collect();
         work.iter().for_each(|&work| may(Act::Take(work)));
-        for unit in indices(u64::from(state.opened)).map(|unit| unit as u8) {
-            self.carries().iter().for_each(|&carry| may(Act::Come { unit, carry }));
-        }
+        // Who has the shared renderer renders, or puts it back ahead of all else.
+        let opened = if renders { 0 } else { state.opened };
+        indices(u64::from(opened)).for_each(|unit| may(Act::Come(unit as u8)));
         // What it keeps it queues where somebody is hungry, or before it goes to another home.
         if me.at == At::GoingOn && !me.holds && me.carried.iter().any(Work::is_rendering) {
             may(Act::Share);
         }
         let awaits = config.sleep || me.at == At::GoingOn;
-        if awaits && work.is_empty() && state.opened == 0 && !me.offers {
+        if awaits && work.is_empty() && opened == 0 && !me.offers {
             may(Act::Go { carry: false });
         }
     }

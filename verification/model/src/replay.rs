@@ -15,7 +15,7 @@ use crate::model::{Action, Protocol};
 use crate::state::{At, Because, State, Worker};
 use crate::step::Act;
 use crate::trace::{Event, Seen, Task};
-use crate::work::Work;
+use crate::work::{Work, indices};
 
 /// A run that the model does not allow.
 #[derive(Clone, Debug)]
@@ -68,7 +68,7 @@ pub fn replay(config: &Config, record: &[Seen]) -> Result<Replayed, Refused> {
     let count = |event| record.iter().filter(|seen| seen.event == event).count().min(251) as u8;
     let joins = count(Event::Join);
     assert!(joins <= 250, "too many workers");
-    // One that never does anything: whoever leaves is not the last.
+    // One that does nothing but come for units: whoever leaves is not the last.
     let config = Config {
         workers: joins + 1,
         late: joins,
@@ -127,6 +127,7 @@ fn only_frees(at: At) -> bool {
         At::Found(..)
             | At::AtGate(..)
             | At::Opening(..)
+            | At::Coming { .. }
             | At::Interacted(_)
             | At::Passing { .. }
             | At::PuttingBack(Because::Leaves)
@@ -183,17 +184,19 @@ impl Replay {
         acts
     }
 
+    /// What only frees in `state`. Whoever comes for a unit of an open frame does; here it is the one who never does
+    /// anything else.
+    fn frees(&self, state: &State) -> Option<Action> {
+        let worker = state.workers.iter().position(|worker| only_frees(worker.at));
+        let comes = || Some((0, Act::Come(indices(u64::from(state.opened)).next()? as u8)));
+        worker.map_or_else(comes, |worker| self.acts(state, worker as u8).first().copied())
+    }
+
     /// `state` after `action` and all that only frees; `None` if that breaks a rule.
     fn made(&self, state: &State, action: Action) -> Option<State> {
         let mut state = self.model.next_state(state, action)?;
-        while let Some(worker) = state.workers.iter().position(|worker| only_frees(worker.at)) {
-            let act = *self.acts(&state, worker as u8).first()?;
+        while let Some(act) = self.frees(&state) {
             state = self.model.next_state(&state, act)?;
-        }
-        // Whoever comes for a unit of an open frame only frees it; here it is the one who never does anything else.
-        while state.opened != 0 {
-            let unit = state.opened.trailing_zeros() as u8;
-            state = self.model.next_state(&state, (0, Act::Come { unit, carry: false }))?;
         }
         let config = &self.model.0;
         let sound = state.broken.is_none() && state.access(config) && state.tokens(config);

@@ -248,6 +248,7 @@ impl Step<'_> {
                 self.state.unit(unit).pending = 2;
                 self.end();
             }
+            At::Coming { unit, turned } => self.came(unit, turned),
             At::Rendered(unit) => self.render_counted(unit),
             At::Counting => self.count_rendered(),
             At::Reentering(unit) => self.advance(unit, Then::Enter(unit + 1)),

@@ -123,6 +123,13 @@ pub enum At {
     Calling,
     /// Has looked for renderings, and goes on: with one if it has the shared renderer, or with whatever it finds.
     GoingOn,
+    /// Has taken a unit of the open frame that nobody had come for, and is to arrive at its countdown.
+    Coming {
+        /// The unit.
+        unit: u8,
+        /// Whether it has looked for renderings in this step.
+        turned: bool,
+    },
     /// Its step found nothing to do: it will sleep.
     Idle,
     /// Has announced that it will sleep; rung since or not.

@@ -19,13 +19,8 @@ pub enum Act {
     Share,
     /// It looks for renderings: it is about to take the shared renderer, or to put it back.
     Turn,
-    /// It comes for a unit of the open frame, and updates it, or lets it go, if it waits for nothing else.
-    Come {
-        /// The unit.
-        unit: u8,
-        /// Carry.
-        carry: bool,
-    },
+    /// It takes a unit of the open frame that nobody has come for.
+    Come(u8),
     /// It begins a work unit.
     Take(Work),
     /// It tests a pair, which is a candidate or not.
@@ -63,10 +58,7 @@ pub(crate) struct Step<'c> {
 impl<'c> Step<'c> {
     /// The state after worker `number` has done `act`, which must be possible.
     pub(crate) fn made(config: &'c Config, state: &State, number: usize, act: Act) -> State {
-        let carry = matches!(
-            act,
-            Act::Call { carry: true } | Act::Go { carry: true } | Act::Come { carry: true, .. }
-        );
+        let carry = matches!(act, Act::Call { carry: true } | Act::Go { carry: true });
         let mut step = Self { config, state: state.clone(), number, carry };
         match act {
             Act::Join => step.worker().at = At::Awake,
@@ -75,7 +67,7 @@ impl<'c> Step<'c> {
             Act::Hold => step.hold(),
             Act::Share => step.share(),
             Act::Turn => step.turn(),
-            Act::Come { unit, .. } => step.come(unit),
+            Act::Come(unit) => step.come(unit),
             Act::Take(work) => step.take(work),
             Act::Test { pair, near } => step.test(pair, near),
             Act::Call { .. } => step.call(),
@@ -149,9 +141,16 @@ impl<'c> Step<'c> {
     /// Comes for `unit`, whose frame is open.
     fn come(&mut self, unit: u8) {
         self.state.opened &= !(1 << unit);
+        let turned = self.at() == At::GoingOn;
+        self.goes_to(At::Coming { unit, turned });
+    }
+
+    /// Takes the opening off `unit`'s countdown, and updates it, or lets it go, if it waits for nothing else.
+    pub(crate) fn came(&mut self, unit: u8, turned: bool) {
         if self.take_off(unit) || self.config.has(Bug::UpdatedWhenOpened) {
             self.emit(Work::Update(unit));
         }
+        self.goes_to(if turned { At::GoingOn } else { At::Awake });
         self.announce_between();
     }
 

@@ -29,7 +29,7 @@ explored! {
         pairwise_after_render pairwise_after_swap pools_come_round two_tokens shared_renderer
         solitary_unit letters errors_do_no_harm within three_pairs rendering_comes_first two_holders_at_a_swap
         sleeps_through_a_swap rendering_waits_for_a_swap finished_shows_all;
-    cost: alone;
+    cost: alone in_vain;
 }
 
 /// No model is left out of the list above.

@@ -27,7 +27,7 @@ fn ring_shows_work() {
         let (pipeline, world) = build(Setup { units: 1, frames: 1, ..Setup::default() });
         let screen: Screen = lend(Guarded::new(0));
         let mut updater = pipeline.worker();
-        // Entered; the update is queued.
+        // Entered; the unit is there to come for.
         assert_ne!(step(&mut updater, world), Step::Idle);
         let update: Role<bool> = Box::new(move || step(&mut updater, world) != Step::Idle);
         let render: Role<bool> = Box::new(move || {
@@ -115,7 +115,7 @@ fn render_wakes_holders_only() {
         });
         let sleep: Role<()> = Box::new(move || {
             let worker = ManuallyDrop::new(pipeline.worker());
-            // Not while the update is still queued.
+            // Not while the unit is still there to come for.
             if !worker.has_cause_to_wake() {
                 worker.wait();
                 assert!(pipeline.finished(), "woken before there is cause");

@@ -91,7 +91,9 @@ const PUT_BACK: u32 = 1 + 1 + 3;
 /// It is taken if a rendering is seen; or put back if none is, and taken again if one is seen all the same. It is put
 /// back where others have rendered what was seen.
 const SHARE_RENDERER: u32 = 3 + PUT_BACK + 2 + PUT_BACK;
-/// Where nobody takes away what was seen; a rendering is found without coming for units.
+/// Looks at all queues of a home, whose units all wait for more, and once again when they have been come for.
+const LOOK_IN_VAIN: u32 = 22;
+/// Where nobody takes away what was seen, and something is found: a rendering without coming for units.
 fn find_alone(units: u32, stage: Stage) -> u32 {
     let comes = if stage == Stage::Render { 0 } else { units * COME + EMIT };
     3 + (HOMES as u32 - 1) * 10 + LOOK + comes
@@ -187,4 +189,30 @@ fn alone() {
     assert!(reached.iter().all(|&percent| percent > 25), "bounds that say little: {reached:?} %");
 }
 
-pub(crate) const ALL: &[Model] = &[("cost::alone", alone)];
+/// A worker finds that all units of the open frame wait for an interaction that another one has in hand.
+fn in_vain() {
+    check("cost::in_vain", None, 2, [()], |order| {
+        let setup = Setup { units: 2, frames: 1, ..Setup::default() };
+        let (pipeline, world) = build(setup);
+        let [mut busy, mut worker] = [0, 1].map(|_| pipeline.worker());
+        if order == 1 {
+            let Ok(token) = pipeline.token(lend(Guarded::new(0))) else {
+                panic!("a token is left")
+            };
+            assert!(worker.hold(token).is_ok());
+        }
+        for opens in [false, true] {
+            assert_eq!(step_alone(&mut busy, world, opens), Step::Worked(Stage::BroadPhase));
+        }
+        meter(true);
+        let found = worker.step(world);
+        let Cost { accesses, retries } = meter(false).expect("it was started");
+        assert!(matches!(found, Ok(Step::Idle)) && retries == 0);
+        // It counts itself among the hungry.
+        let most = 13 + HOMES as u32 * LOOK_IN_VAIN + setup.units * COME + 1;
+        assert!(accesses <= most, "a step of {accesses} accesses, {most} are allowed");
+        assert!(2 * accesses > most, "a bound that says little: {accesses} of {most}");
+    });
+}
+
+pub(crate) const ALL: &[Model] = &[("cost::alone", alone), ("cost::in_vain", in_vain)];
