@@ -184,8 +184,8 @@ impl Bells {
     /// Announces `any` work units that every worker can do, and `renders` that only holders can.
     ///
     /// As many sleepers are woken at once as there is work for, not one by one in a chain (where a frame opens as many as
-    /// there are units, though some of those may turn out to wait for more); a
-    /// holder only for what the others are too few for, or to render. Who was woken before and is not awake yet
+    /// there are units, though some of those may turn out to wait for more); a holder only for what the others are too few
+    /// for, or to render. Who was woken before and is not awake yet
     /// counts as a sleeper still: a holder may then come late, but what there is to do waits in a queue.
     pub(crate) fn announce(&self, waiting: &impl Waiting, any: u32, renders: u32) {
         fence(site::FENCE_RING);

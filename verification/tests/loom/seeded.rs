@@ -3,9 +3,10 @@
 
 use crate::models::arrivals::Meets;
 use crate::models::countdown::Counts;
+use crate::models::offer::Offers;
 use crate::models::ring::Queue;
 use crate::models::{
-    Guarded, Role, arrivals, check, cost, countdown, lend, lend_slice, named, ring, together,
+    Guarded, Role, arrivals, check, cost, countdown, lend, lend_slice, named, offer, ring, together,
 };
 use loom::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::panic::catch_unwind;
@@ -110,6 +111,34 @@ impl Counts for LoadStore {
 #[test]
 fn a_countdown_that_loads_then_stores_loses_arrivals() {
     caught(countdown::last_sees_all::<LoadStore>, "one last arriver");
+}
+
+/// An offer that loads, then stores.
+struct TakenTwice {
+    next: AtomicU32,
+    count: u32,
+}
+
+impl Offers for TakenTwice {
+    fn make(count: usize) -> Self {
+        Self { next: AtomicU32::new(count as u32), count: count as u32 }
+    }
+    fn offer(&self) {
+        self.next.store(0, Ordering::Release);
+    }
+    fn take(&self) -> Option<u32> {
+        let place = self.next.load(Ordering::Acquire);
+        (place < self.count).then(|| {
+            self.next.store(place + 1, Ordering::Release);
+            place
+        })
+    }
+}
+
+#[test]
+fn an_offer_that_loads_then_stores_is_taken_twice() {
+    caught(offer::takers_see_what_came_before::<TakenTwice>, "outcomes seen");
+    caught(offer::once_a_round::<TakenTwice>, "Causality violation");
 }
 
 /// An arrival set that loads, then stores.
