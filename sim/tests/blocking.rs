@@ -23,7 +23,11 @@ fn number_and_size_of_blocks() {
     // Particles, workers, blocks of particles; one block of walls comes on top.
     for (objects, workers, expected) in [
         (1, 4, 1),
-        (64, 1, 64),
+        (9, 1, 9),
+        (10, 1, 1),
+        (30, 2, 2),
+        (30, 4, 30),
+        (64, 1, 2),
         (65, 1, 2),
         (100, 2, 2),
         (200, 2, 4),
@@ -45,10 +49,10 @@ fn number_and_size_of_blocks() {
         assert_eq!(blocks.len(), expected + 1, "{objects} particles, {workers} workers");
         let sizes: Vec<usize> =
             blocks[..expected].iter().map(|block| block.objects().len()).collect();
-        // Eight are advanced side by side; blocks of twice to some five times as many differ by fours, and few objects
-        // are blocks by themselves.
+        // Eight are advanced side by side; blocks of twice to some five times as many differ by fours, and those of few
+        // objects by single ones.
         let share = match objects / expected {
-            1 => 1,
+            _ if objects <= 64 => 1,
             16..45 => 4,
             _ => 8,
         };

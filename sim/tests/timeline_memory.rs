@@ -39,7 +39,7 @@ fn no_allocation() {
     }
     assert_eq!(allocations(), before);
 
-    let scene = || particles(60, true, true);
+    let scene = || particles(60, false, true);
     for (name, mut executor) in executors(scene, Grain::Spatial, 2).take(4) {
         let timeline = Arc::new(Timeline::new(2, SPANS));
         executor.watch(Arc::clone(&timeline));

@@ -75,6 +75,21 @@ impl Order {
     }
 }
 
+/// How many of these objects may be advanced together, if all may but rigid ones, whose updates take next to no time; 0
+/// otherwise.
+pub(crate) fn alike<'o>(objects: impl Iterator<Item = &'o Object>) -> usize {
+    let mut bodies = objects.filter(|object| object.geometry.as_rigid().is_none()).map(kind);
+    let Some(Some(first)) = bodies.next() else { return 0 };
+    bodies.try_fold(1, |count, kind| (kind == Some(first)).then_some(count + 1)).unwrap_or(0)
+}
+
+/// The topology of an object that may be advanced together with others of its kind, and whether it is damped.
+fn kind(object: &Object) -> Option<(usize, bool)> {
+    let nodes = object.geometry.as_mesh()?.topology().nodes();
+    let (topology, is_damped, _) = Order::of(object).springs?;
+    may_be_abreast(nodes).then_some((topology, is_damped))
+}
+
 /// Begins the update of an object that is a mass–spring body and nothing else: its springs then wait
 /// for [`advance`]. `false`, and nothing has happened, for any other object.
 pub(crate) fn begin(object: &mut Object, place: usize, input: &mut Input<'_>) -> bool {

@@ -5,6 +5,7 @@ mod split;
 use thiserror::Error;
 
 use self::split::{Division, Key, Members, Parts};
+use crate::behavior::batch;
 use crate::block::Block;
 use crate::cost::FRAMES_PER_NOTE;
 use crate::object::{Object, ObjectId};
@@ -45,9 +46,12 @@ pub enum BlockingError {
 /// The frames between two regroupings, usually 32: in so many a particle moves by a fraction of a block.
 pub const FRAMES_PER_BLOCKING: u64 = FRAMES_PER_NOTE;
 
-/// Objects up to which each is a block of its own: few objects are heavy or uneven ones, and blocks of them
-/// would be too.
+/// Objects up to which each is a block of its own, unless they are [alike](batch::alike): few objects are usually heavy
+/// ones, and blocks of them would be too.
 const SINGLE_OBJECTS: usize = 64;
+/// The fewest of a worker's that are in a block then; usually 10: being advanced side by side gains fewer less than is lost
+/// where they cannot be shared out one by one.
+const FEWEST_TOGETHER: usize = 10;
 /// Blocks for each object to the power of 2/3; usually 0.1. The tests between blocks grow as the square of their
 /// number, those within blocks as the square of the objects of each: with that power both stay in balance.
 const BLOCKS: f64 = 0.1;
@@ -151,11 +155,11 @@ impl Blocking {
             kinds[kind(object)].push(object.id().0);
         }
         let [moving, scenery, solitary] = kinds;
-        let count = |objects: usize| match grain {
-            Grain::Pairwise => objects,
-            Grain::Spatial => block_count(objects, workers),
+        let count = |ids: &[u32]| match grain {
+            Grain::Spatial if is_grouped(&objects, ids, workers) => block_count(ids.len(), workers),
+            Grain::Spatial | Grain::Pairwise => ids.len(),
         };
-        let moving_blocks = count(moving.len());
+        let moving_blocks = count(&moving);
         let scenery = match grain {
             Grain::Pairwise => scenery.into_iter().map(|id| Members::of(vec![id])).collect(),
             Grain::Spatial => group_scenery(&objects, scenery, workers),
@@ -171,7 +175,7 @@ impl Blocking {
         split::evenly(&mut keys, parts, 0, share);
         number(&mut members);
         members.extend(scenery);
-        let size = solitary.len().div_ceil(count(solitary.len()).max(1)).max(1);
+        let size = solitary.len().div_ceil(count(&solitary).max(1)).max(1);
         let solitary = solitary.chunks(size).map(|ids| Members::of(ids.to_vec()));
         let solitary_blocks = solitary.len();
         members.extend(solitary);
@@ -292,10 +296,10 @@ impl Blocking {
 }
 
 /// How many objects are shared out to blocks at a time: as many as are advanced side by side, or fewer, or one by one where
-/// each is a block.
+/// each is a block, or they are few: of those each counts.
 fn share(objects: usize, blocks: usize) -> usize {
     match objects / blocks.max(1) {
-        0 | 1 => 1,
+        _ if objects <= blocks.max(SINGLE_OBJECTS) => 1,
         objects if (2 * HALF..FULL).contains(&objects) => FEW,
         _ => HALF,
     }
@@ -353,12 +357,16 @@ fn group_scenery(objects: &[Object], ids: Vec<u32>, workers: usize) -> Vec<Membe
     members
 }
 
+/// Whether the objects with these numbers are in blocks of several: many are, and few that are alike, if there are enough
+/// to be advanced side by side for each worker.
+fn is_grouped(objects: &[Object], ids: &[u32], workers: usize) -> bool {
+    let few = || ids.iter().filter_map(|&id| objects.get(id as usize));
+    ids.len() > SINGLE_OBJECTS || batch::alike(few()) >= FEWEST_TOGETHER * workers.max(1)
+}
+
 /// The number of blocks for so many objects. None is for fewer of them than are advanced side by side, which
 /// would take as long.
 fn block_count(objects: usize, workers: usize) -> usize {
-    if objects <= SINGLE_OBJECTS {
-        return objects;
-    }
     let workers = workers.max(1);
     let fewest_tests = (BLOCKS * (objects as f64).cbrt().powi(2)).round() as usize;
     let [fewest, usual] = [FEWEST_PER_WORKER, USUAL_PER_WORKER].map(|blocks| blocks * workers);

@@ -1,14 +1,14 @@
 use std::fmt::Debug;
 use std::time::Duration;
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 use proptest::prelude::*;
 
 use super::*;
-use crate::behavior::Fixed;
 use crate::behavior::batch::Order;
+use crate::behavior::{Fixed, Keyframe, Scripted};
 use crate::geometry::{Geometry, Rigid};
 use crate::message::Message;
 use crate::object::{Group, ObjectId};
@@ -18,13 +18,17 @@ use crate::simd::Simd;
 /// Deals particles whose updates take so many microseconds, for two workers; for each home what its blocks' updates
 /// take, and how many objects they have.
 fn dealt(micros: &[u64], homes: u32, besides: u64) -> Vec<Vec<(u64, usize)>> {
+    dealt_for(2, micros, homes, besides)
+}
+
+fn dealt_for(workers: usize, micros: &[u64], homes: u32, besides: u64) -> Vec<Vec<(u64, usize)>> {
     let scene = ParticleScene::new(micros.len()).build().expect("a valid scene");
     let mut objects = scene.objects;
     for (object, &micros) in objects.iter_mut().zip(micros) {
         object.note_cost(Duration::from_micros(micros));
     }
     let (mut blocking, mut blocks) =
-        Blocking::new(objects, Grain::Spatial, 2).expect("a valid environment");
+        Blocking::new(objects, Grain::Spatial, workers).expect("a valid environment");
     blocking.deal(&mut blocks, homes, Duration::from_micros(besides).as_secs_f32());
     let mut given = vec![Vec::new(); homes as usize];
     for (index, block) in blocks.iter().enumerate().take(blocking.moving_blocks) {
@@ -150,8 +154,9 @@ fn cost(home: &[(u64, usize)]) -> u64 {
 fn homes_take_equally_long_and_begin_with_the_longest() {
     let micros: Vec<u64> = (1..=30).map(|object| object * object % 97 + 1).collect();
     let longest = 97;
-    for homes in 1..=4 {
-        let given = dealt(&micros, homes, 0);
+    // One by one for four workers.
+    for (workers, homes, blocks) in [(2, 1, 2), (2, 2, 2), (4, 1, 30), (4, 2, 30), (4, 4, 30)] {
+        let given = dealt_for(workers, &micros, homes, 0);
         let share = micros.iter().sum::<u64>() / u64::from(homes);
         for home in &given {
             let cost = cost(home);
@@ -159,8 +164,38 @@ fn homes_take_equally_long_and_begin_with_the_longest() {
             let halves = home.windows(2).filter(|pair| pair[1].0 >= 2 * pair[0].0);
             assert_eq!(halves.count(), 0, "a long one after a short one: {home:?}");
         }
-        assert_eq!(given.iter().map(Vec::len).sum::<usize>(), micros.len());
+        assert_eq!(given.iter().map(Vec::len).sum::<usize>(), blocks);
     }
+}
+
+/// The number of blocks of so many particles, and of something else that follows a script.
+fn blocks_of(particles: usize, grain: Grain, workers: usize, other: Option<Geometry>) -> usize {
+    let scene = ParticleScene::new(particles).build().expect("a valid scene");
+    let mut objects = scene.objects;
+    objects.truncate(particles);
+    let id = ObjectId(particles as u32);
+    let here = Keyframe { frame: 0, position: Vec3::ZERO, rotation: Quat::IDENTITY };
+    objects.extend(other.map(|geometry| {
+        Object::new(id, Group(0), geometry, Scripted::new(vec![here]).expect("a valid script"))
+    }));
+    Blocking::new(objects, grain, workers).expect("a valid environment").1.len()
+}
+
+#[test]
+fn few_are_grouped_only_to_be_advanced_side_by_side() {
+    let spatial = |particles, workers, other| blocks_of(particles, Grain::Spatial, workers, other);
+    for (workers, particles) in [(1, 10), (2, 20), (2, 30), (4, 47), (2, SINGLE_OBJECTS)] {
+        assert_eq!(spatial(particles, workers, None), workers, "{particles}");
+        let too_many = particles / FEWEST_TOGETHER + 1;
+        assert_eq!(spatial(particles, too_many, None), particles);
+        assert_eq!(blocks_of(particles, Grain::Pairwise, workers, None), particles);
+    }
+    let wall = Geometry::Rigid(Rigid::wall(Vec3::ZERO, Vec3::Y));
+    assert_eq!(spatial(30, 2, Some(wall)), 2);
+    let scene = ParticleScene::new(1).build().expect("a valid scene");
+    let surface = || Some(scene.objects[0].geometry.clone());
+    assert_eq!(spatial(30, 2, surface()), 31, "it may take as long as all others");
+    assert_eq!(spatial(SINGLE_OBJECTS, 2, surface()), 2, "they are many");
 }
 
 /// A field of stones in a room, and the blocks that it makes.
