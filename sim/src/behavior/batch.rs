@@ -90,6 +90,12 @@ fn kind(object: &Object) -> Option<(usize, bool)> {
     may_be_abreast(nodes).then_some((topology, is_damped))
 }
 
+/// What a body's part is of what all that are advanced together take, by its substeps; of any other object nothing is known.
+pub(crate) fn weight(object: &Object) -> Option<f32> {
+    let [body, substep] = FULL;
+    Order::of(object).springs.map(|(.., Reverse(substeps))| body + substep * substeps as f32)
+}
+
 /// Begins the update of an object that is a mass–spring body and nothing else: its springs then wait
 /// for [`advance`]. `false`, and nothing has happened, for any other object.
 pub(crate) fn begin(object: &mut Object, place: usize, input: &mut Input<'_>) -> bool {

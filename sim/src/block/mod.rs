@@ -7,7 +7,7 @@ use std::time::Duration;
 use glam::Vec3;
 
 use self::extents::{Extents, Overlaps, OverlapsWithin, Reaches};
-use crate::behavior::batch::Order;
+use crate::behavior::batch::{self, Order};
 use crate::cost::Timings;
 use crate::geometry::{Bounds, Extent};
 use crate::interaction::{Member, group_set};
@@ -144,7 +144,12 @@ impl Block {
     pub(crate) fn note_cost(&mut self, took: Duration) {
         // Bodies that are advanced together have no time of their own.
         let share = took / self.objects.len().max(1) as u32;
-        self.objects.iter_mut().for_each(|object| object.note_cost(share));
+        let weights = self.objects.iter().filter_map(batch::weight);
+        let (bodies, total) = weights.fold((0.0, 0.0), |(n, sum), weight| (n + 1.0, sum + weight));
+        for object in &mut self.objects {
+            let part = batch::weight(object).map_or(1.0, |weight| weight * bodies / total);
+            object.note_cost(share.mul_f32(part));
+        }
         self.list_costs();
         self.disordered = true;
     }
@@ -262,6 +267,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::scene::ParticleScene;
 
     /// A box somewhere, or that of a solitary object, or a wall's, or one without end.
     fn any_box() -> impl Strategy<Value = Bounds> {
@@ -301,6 +307,23 @@ mod tests {
         all.iter().enumerate().for_each(|(place, own)| block.extents.set(place, own));
         block.enclose(all.iter().fold(Bounds::EMPTY, |whole, own| whole.union(&own.bounds)));
         block
+    }
+
+    #[test]
+    fn what_an_update_took_is_shared_out_by_substeps() {
+        let scene = ParticleScene { most_substeps: 100, ..ParticleScene::new(20) };
+        let objects = scene.build().expect("a valid scene").objects;
+        let mut block = Block::new(objects.into_iter().take(21).collect());
+        block.note_cost(Duration::from_millis(21));
+        let (wall, bodies): (Vec<_>, Vec<_>) = block.objects().iter().partition(|o| o.is_fixed());
+        assert!(wall.iter().map(|wall| wall.cost()).eq([1e-3]), "nothing is known of it");
+        let total: f32 = bodies.iter().map(|body| body.cost()).sum();
+        assert!((total - 20e-3).abs() < 1e-6, "{total}");
+        let price = |body: &&Object| body.cost() / batch::weight(body).expect("a body");
+        let prices: Vec<f32> = bodies.iter().map(price).collect();
+        assert!(prices.iter().all(|price| (price / prices[0] - 1.0).abs() < 1e-3), "{prices:?}");
+        let costs: Vec<f32> = bodies.iter().map(|body| body.cost()).collect();
+        assert!(costs[0] > 3.0 * costs[19], "{costs:?}");
     }
 
     proptest! {

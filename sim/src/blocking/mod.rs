@@ -2,6 +2,7 @@
 
 mod split;
 
+use glam::Vec3;
 use thiserror::Error;
 
 use self::split::{Division, Key, Members, Parts};
@@ -52,6 +53,9 @@ const SINGLE_OBJECTS: usize = 64;
 /// The fewest of a worker's that are in a block then; usually 10: being advanced side by side gains fewer less than is lost
 /// where they cannot be shared out one by one.
 const FEWEST_TOGETHER: usize = 10;
+/// The most objects of a block for which few are dealt by what they weigh, and not by place; usually 20. Lanes in which
+/// several would follow each other are full however they are dealt.
+const MOST_BY_WEIGHT: usize = 20;
 /// Blocks for each object to the power of 2/3; usually 0.1. The tests between blocks grow as the square of their
 /// number, those within blocks as the square of the objects of each: with that power both stay in balance.
 const BLOCKS: f64 = 0.1;
@@ -209,7 +213,7 @@ impl Blocking {
     /// space come one after the other. Does nothing with fewer of them.
     pub fn split(&mut self, blocks: &mut [Block]) {
         let Some(blocks) = blocks.get_mut(..self.moving_blocks) else { return };
-        self.list(blocks);
+        self.list(blocks.iter().flat_map(Block::places));
         let Self { members, of_blocks, of_homes, .. } = self;
         let members = &mut members[..self.moving_blocks];
         let parts = Parts { members, of_blocks, of_homes };
@@ -220,12 +224,14 @@ impl Blocking {
 
     /// The same for so many homes, which get as much of the work as makes them take equally long, as far as that is
     /// known. Who works at home 0 does something else too, for `besides` seconds a frame. Blocks of one home are close
-    /// in space, and each has its longest blocks first, so that none of its last is long. Of solitary objects each home
-    /// has as many blocks.
+    /// in space, or, of few bodies that are advanced side by side, in substeps, and each has its longest blocks first, so
+    /// that none of its last is long. Of solitary objects each home has as many blocks.
     pub fn deal(&mut self, blocks: &mut [Block], homes: u32, besides: f32) {
         let Some(blocks) = blocks.get_mut(..self.moving_blocks) else { return };
-        self.list(blocks);
         let homes = homes.max(1);
+        if homes == 1 || !self.list_by_weight(blocks) {
+            self.list(blocks.iter().flat_map(Block::places));
+        }
         let first_solitary = self.members.len() - self.solitary_blocks;
         for (place, members) in self.members[first_solitary..].iter_mut().enumerate() {
             members.home = place as u32 % homes;
@@ -242,12 +248,29 @@ impl Blocking {
         self.regroup(blocks);
     }
 
-    /// Lists where the objects of these blocks are.
-    fn list(&mut self, blocks: &[Block]) {
+    /// Lists what few objects that are in blocks weigh, in the place of where they are: each lane takes as long as the longest
+    /// beside it. Says whether that is better.
+    fn list_by_weight(&mut self, blocks: &[Block]) -> bool {
+        let objects: usize = blocks.iter().map(|block| block.ids().len()).sum();
+        let most = SINGLE_OBJECTS.min(MOST_BY_WEIGHT * blocks.len());
+        if objects <= blocks.len() || objects > most {
+            return false;
+        }
+        self.list(blocks.iter().flat_map(Block::objects).map(|object| {
+            let weight = batch::weight(object).unwrap_or(0.0);
+            // While none is known, any that are to each other as the weights are.
+            let cost = if object.cost() > 0.0 { object.cost() } else { weight * 1e-6 };
+            (object.id(), Vec3::X * weight, cost)
+        }));
+        split::span(&self.keys) > 0.0
+    }
+
+    /// Lists these numbers, places and costs of objects.
+    fn list(&mut self, objects: impl Iterator<Item = (ObjectId, Vec3, f32)>) {
         self.keys.clear();
         // A block may be another that was put in its place, with an object that is not known here.
         let is_known = |key: &Key| (key.id as usize) < self.block_of.len();
-        self.keys.extend(blocks.iter().flat_map(Block::places).map(Key::new).filter(is_known));
+        self.keys.extend(objects.map(Key::new).filter(is_known));
     }
 
     /// The home of the block number `index`; 0 without such a block, and for those that never move.

@@ -198,6 +198,54 @@ fn few_are_grouped_only_to_be_advanced_side_by_side() {
     assert_eq!(spatial(SINGLE_OBJECTS, 2, surface()), 2, "they are many");
 }
 
+/// For each of two homes what of particles with 1 to so many substeps it is dealt weighs, from the heaviest on; before
+/// anything is known of what they take.
+fn weights_of(particles: usize, most_substeps: u32) -> [Vec<f32>; 2] {
+    let scene = ParticleScene { most_substeps, ..ParticleScene::new(particles) };
+    let objects = scene.build().expect("a valid scene").objects;
+    let (mut blocking, mut blocks) =
+        Blocking::new(objects, Grain::Spatial, 2).expect("a valid environment");
+    blocking.deal(&mut blocks, 2, 0.0);
+    let mut weights = [const { Vec::new() }; 2];
+    for (index, block) in blocks.iter().enumerate().take(blocking.moving_blocks) {
+        let home = &mut weights[blocking.home(index) as usize];
+        home.extend(block.objects().iter().filter_map(batch::weight));
+    }
+    for home in &mut weights {
+        home.sort_unstable_by(|a, b| b.total_cmp(a));
+    }
+    weights.sort_unstable_by(|a, b| b[0].total_cmp(&a[0]));
+    weights
+}
+
+#[test]
+fn few_bodies_are_beside_those_of_like_substeps() {
+    for particles in [20, 30, 40] {
+        let [heavy, light] = weights_of(particles, 100);
+        assert!(heavy.last() >= light.first(), "{heavy:?}, {light:?}");
+        let [heavy, light] = [heavy, light].map(|home| home.iter().sum::<f32>());
+        assert!((heavy - light).abs() < 52.0, "{heavy}, {light}: more than one body's");
+    }
+    for particles in [19, 41, 65] {
+        let [some, others] = weights_of(particles, 100);
+        assert!(some.last() < others.first(), "{particles} are by place: {some:?}, {others:?}");
+    }
+}
+
+#[test]
+fn bodies_of_equal_substeps_are_dealt_by_place() {
+    let scene = ParticleScene { most_substeps: 1, ..ParticleScene::new(30) };
+    let objects = scene.build().expect("a valid scene").objects;
+    let (mut blocking, mut blocks) =
+        Blocking::new(objects, Grain::Spatial, 2).expect("a valid environment");
+    let numbers = |blocks: &[Block]| -> Vec<Vec<ObjectId>> {
+        blocks.iter().map(|block| block.ids().to_vec()).collect()
+    };
+    let by_place = numbers(&blocks);
+    blocking.deal(&mut blocks, 2, 0.0);
+    assert_eq!(numbers(&blocks), by_place);
+}
+
 /// A field of stones in a room, and the blocks that it makes.
 fn scenery(stones: usize, workers: usize) -> Vec<Vec<ObjectId>> {
     let wall = Rigid::wall(Vec3::ZERO, Vec3::Y);
