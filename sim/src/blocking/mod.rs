@@ -322,11 +322,11 @@ impl Blocking {
 /// How many objects are shared out to blocks at a time: as many as are advanced side by side, or fewer, or one by one where
 /// each is a block, or they are few: of those each counts.
 fn share(objects: usize, blocks: usize) -> usize {
-    match objects / blocks.max(1) {
-        _ if objects <= blocks.max(SINGLE_OBJECTS) => 1,
-        objects if (2 * HALF..FULL).contains(&objects) => FEW,
-        _ => HALF,
+    if objects <= blocks.max(SINGLE_OBJECTS) {
+        return 1;
     }
+    let each = objects / blocks.max(1);
+    if (2 * HALF..FULL).contains(&each) { FEW } else { HALF }
 }
 
 /// How many shares one of so many blocks may come to have.
