@@ -24,9 +24,6 @@ const ALONE: f32 = 3.4;
 const TURN: f32 = 16.0;
 /// What a substep of theirs costs, likewise; usually 4.8.
 const STEP: f32 = 4.8;
-/// How many times as much a turn and a substep cost in twice as many lanes, where a register holds them; usually 1.5: 1.2
-/// where such registers are computed with as fast as with shorter ones, up to 1.9 elsewhere.
-const WIDE: f32 = 1.5;
 /// What a body costs where all lanes are full, before its first substep and for each, likewise; usually 2.9 and 0.48.
 const FULL: [f32; 2] = [2.9, 0.48];
 /// The fewest bodies that may be better off side by side than one by one, by what they cost; usually 5.
@@ -117,7 +114,8 @@ pub(crate) fn advance(objects: &mut [Object], work: &mut SpringWork, frame: u64,
             let object = &mut objects[first.place];
             let Some(mesh) = object.geometry.as_mesh_mut() else { break };
             let is_small = mesh.topology().nodes() <= MOST_NODES / 2;
-            let (count, lanes) = together(alike, if is_small { simd.width() } else { HALF });
+            let registers = if is_small { Registers::of(simd) } else { Registers::SHORT };
+            let (count, lanes) = together(alike, registers);
             let (now, later) = alike.split_at(count);
             if now.len() > 1 {
                 let extents = advance_together(now, lanes, objects, abreast, simd);
@@ -134,9 +132,30 @@ pub(crate) fn advance(objects: &mut [Object], work: &mut SpringWork, frame: u64,
     waiting.clear();
 }
 
+/// What bodies side by side are computed with.
+#[derive(Clone, Copy)]
+struct Registers {
+    /// How many lanes one holds.
+    lanes: usize,
+    /// How many times as much a turn and a substep cost in all of them as in [`HALF`].
+    cost: f32,
+}
+
+impl Registers {
+    const SHORT: Self = Self { lanes: HALF, cost: 1.0 };
+
+    fn of(simd: Simd) -> Self {
+        match simd.width() {
+            HALF => Self::SHORT,
+            lanes => Self { lanes, cost: abreast::cost_of_all_lanes() },
+        }
+    }
+}
+
 /// How many of the first bodies are best advanced together, and in how many lanes, of which there are at most
-/// `width`: those that cost least of what they would in full lanes.
-fn together(bodies: &[Waiting], width: usize) -> (usize, usize) {
+/// as many as registers hold: those that cost least of what they would in full lanes.
+fn together(bodies: &[Waiting], registers: Registers) -> (usize, usize) {
+    let width = registers.lanes;
     if bodies.len() < FEWEST {
         return (1, HALF);
     }
@@ -148,7 +167,7 @@ fn together(bodies: &[Waiting], width: usize) -> (usize, usize) {
     }
     let mut best = Filling::alone(bodies);
     for (most, lanes) in [(HALF, HALF), (2 * HALF, HALF), (width, width), (2 * width, width)] {
-        let filling = Filling::of(&bodies[..bodies.len().min(most)], lanes);
+        let filling = Filling::of(&bodies[..bodies.len().min(most)], lanes, registers);
         if filling.price < best.price {
             best = filling;
         }
@@ -178,7 +197,7 @@ impl Filling {
     }
 
     /// All of these, two at most for each of so many lanes.
-    fn of(bodies: &[Waiting], lanes: usize) -> Self {
+    fn of(bodies: &[Waiting], lanes: usize, registers: Registers) -> Self {
         let mut substeps = [0; WIDEST];
         for (index, body) in bodies.iter().enumerate() {
             let (_, lane) = seat(index, lanes);
@@ -187,8 +206,8 @@ impl Filling {
         // As many as the longest lane has.
         let steps = substeps.into_iter().max().unwrap_or(0);
         let turns = bodies.len().div_ceil(lanes);
-        let width = if lanes > HALF { WIDE } else { 1.0 };
-        Self::new(bodies, lanes, width * (TURN * turns as f32 + STEP * steps as f32))
+        let times = if lanes > HALF { registers.cost } else { 1.0 };
+        Self::new(bodies, lanes, times * (TURN * turns as f32 + STEP * steps as f32))
     }
 }
 
@@ -237,8 +256,9 @@ mod tests {
     use crate::render::NullRenderer;
     use crate::scene::ParticleScene;
 
-    /// How many bodies that wait with these substeps are advanced first, and in how many lanes of 16.
-    fn first_of(substeps: impl IntoIterator<Item = u32>) -> (usize, usize) {
+    /// How many bodies that wait with these substeps are advanced first, and in how many lanes of 16, which cost so many
+    /// times as much as half of them.
+    fn first_at(cost: f32, substeps: impl IntoIterator<Item = u32>) -> (usize, usize) {
         let springs = Springs {
             damping: 0.0,
             stiffness: 1.0,
@@ -249,7 +269,13 @@ mod tests {
         };
         let body =
             |substeps| Waiting { place: 0, topology: 0, springs: Springs { substeps, ..springs } };
-        together(&substeps.into_iter().map(body).collect::<Vec<_>>(), 2 * HALF)
+        let registers = Registers { lanes: 2 * HALF, cost };
+        together(&substeps.into_iter().map(body).collect::<Vec<_>>(), registers)
+    }
+
+    /// The same where all lanes cost half as much again as half of them.
+    fn first_of(substeps: impl IntoIterator<Item = u32>) -> (usize, usize) {
+        first_at(1.5, substeps)
     }
 
     #[test]
@@ -266,6 +292,8 @@ mod tests {
         assert_eq!(first_of([8; 7]), (7, HALF));
         assert_eq!(first_of([1; 5]), (5, HALF), "a turn is cheaper than five bodies by themselves");
         assert_eq!(first_of([2, 1, 1, 1, 1]), (1, HALF), "but not if most lanes wait for one");
+        assert_eq!(first_at(1.2, [8; 12]), (12, 2 * HALF));
+        assert_eq!(first_at(1.9, [8; 12]), (8, HALF), "where registers of 16 are hardly faster");
         for others in [15, 31, 100] {
             let one_long = std::iter::once(1_000).chain((0..others).map(|_| 1));
             assert_eq!(first_of(one_long), (1, HALF), "{others} others");

@@ -76,6 +76,10 @@ impl Workspace {
         springs.waiting.reserve(room.objects);
         springs.alone.reserve(room.nodes);
         springs.abreast.reserve(room.abreast);
+        if room.abreast > 0 {
+            // Now, and not in a frame.
+            abreast::cost_of_all_lanes();
+        }
         workspace
     }
 }
