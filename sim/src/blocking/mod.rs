@@ -54,9 +54,9 @@ const SINGLE_OBJECTS: usize = 64;
 /// The fewest of a worker's that are in a block then; usually 10: being advanced side by side gains fewer less than is lost
 /// where they cannot be shared out one by one.
 const FEWEST_TOGETHER: usize = 10;
-/// The most objects of a block for which few are dealt by what they weigh, and not by place; usually 20. Lanes in which
+/// The most objects of a block for which few are dealt by what they weigh, and not by place; usually 24. Lanes in which
 /// several would follow each other are full however they are dealt.
-const MOST_BY_WEIGHT: usize = 20;
+const MOST_BY_WEIGHT: usize = 24;
 /// Blocks for each object to the power of 2/3; usually 0.1. The tests between blocks grow as the square of their
 /// number, those within blocks as the square of the objects of each: with that power both stay in balance.
 const BLOCKS: f64 = 0.1;
