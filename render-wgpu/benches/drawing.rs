@@ -7,10 +7,11 @@
 use std::alloc::System;
 use std::cell::Cell;
 use std::error::Error;
+use std::ops::RangeInclusive;
 use std::time::Instant;
 
-use clap::Parser;
 use clap::builder::RangedU64ValueParser;
+use clap::{Parser, value_parser};
 use dualframe_render_wgpu::gpu::Gpu;
 use dualframe_render_wgpu::look::{Look, Quality};
 use dualframe_render_wgpu::picture::Picture;
@@ -35,6 +36,13 @@ static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 /// Pictures' width and height, in pixels: small, so that an adapter in software leaves time to measure.
 const SIZE: (u32, u32) = (320, 180);
 
+/// Frames that are not drawn, ahead of all that are; usually 500. Particles start close together, and drawing is a few
+/// hundredths of what they take while they come apart; then it is some 15.
+const AHEAD: u64 = 500;
+
+/// Substeps that particles can make.
+const SUBSTEPS: RangeInclusive<i64> = 1..=ParticleScene::MAX_SUBSTEPS as i64;
+
 /// What is measured.
 #[derive(Parser)]
 struct Arguments {
@@ -48,12 +56,26 @@ struct Arguments {
     /// Threads of the parallel executors.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = at_least_one(MAX_THREADS as u64))]
     threads: usize,
+    /// The most substeps of a particle: with fewer, drawing is a larger part of the work.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = value_parser!(u32).range(SUBSTEPS))]
+    most_substeps: u32,
     /// See only whether it runs.
     #[arg(long)]
     test: bool,
     /// What cargo adds.
     #[arg(long, hide = true)]
     bench: bool,
+}
+
+impl Arguments {
+    fn scene(&self, objects: usize) -> ParticleScene {
+        ParticleScene { most_substeps: self.most_substeps, ..ParticleScene::new(objects) }
+    }
+
+    /// Frames ahead of those that are drawn.
+    fn ahead(&self) -> u64 {
+        if self.test { 0 } else { AHEAD }
+    }
 }
 
 fn at_least_one(most: u64) -> RangedU64ValueParser<usize> {
@@ -72,19 +94,19 @@ fn main() -> Result<(), Box<dyn Error>> {
     if arguments.test {
         arguments.objects = vec![20];
     }
-    let gpu = Gpu::new(None)?;
-    println!("{}; {}, {} by {} pixels", Machine::this(), gpu.title(), SIZE.0, SIZE.1);
-    token_time(gpu, if arguments.test { 20 } else { 500 })?;
+    let adapter = Gpu::new(None)?.title();
+    println!("{}; {adapter}, {} by {} pixels", Machine::this(), SIZE.0, SIZE.1);
     for &objects in &arguments.objects {
+        token_time(&arguments, objects)?;
         executors(&arguments, objects)?;
     }
     Ok(())
 }
 
 /// Milliseconds of a frame under the token, beside those of a serial frame without drawing.
-fn token_time(gpu: Gpu, objects: usize) -> Result<(), Box<dyn Error>> {
-    let frames = 40;
-    let scene = ParticleScene::new(objects);
+fn token_time(arguments: &Arguments, objects: usize) -> Result<(), Box<dyn Error>> {
+    let (gpu, frames) = (Gpu::new(None)?, 40);
+    let scene = arguments.scene(objects);
     let look = Look::room(scene.room());
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: None,
@@ -100,6 +122,7 @@ fn token_time(gpu: Gpu, objects: usize) -> Result<(), Box<dyn Error>> {
     let mut painter = Painter::new(gpu, look, Quality::Fast, OFFSCREEN_FORMAT, SIZE)?;
     let settings = Settings { executor: ExecutorKind::Serial, threads: 1, ..Settings::default() };
     let mut manager = VeManager::new(scene.build()?, settings)?;
+    manager.run(arguments.ahead(), &mut NullRenderer::new(), &mut |_| ())?;
     let (mut adding, mut painting, mut working) = (Vec::new(), Vec::new(), Vec::new());
     let mut allocations = 0;
     for frame in 0..frames {
@@ -149,12 +172,13 @@ impl Renderer for Add<'_> {
 /// Frames per second of each executor with every frame drawn.
 fn executors(arguments: &Arguments, objects: usize) -> Result<(), Box<dyn Error>> {
     let &Arguments { rounds, threads, test, .. } = arguments;
+    let (scene, ahead) = (arguments.scene(objects), arguments.ahead());
     let frames = if test { 3 } else { (60_000 / objects.max(1)).max(20) as u64 };
     let runners: Vec<Runner> = Runner::parallel(threads).chain([Runner::SERIAL]).collect();
     let expected = Cell::new(None);
     let contender = |&runner: &Runner| {
         let expected = &expected;
-        let run = Box::new(move || drawn(runner, objects, frames, expected));
+        let run = Box::new(move || drawn(runner, scene, [ahead, frames], expected));
         Contender { label: runner.label(), spins: true, run }
     };
     let mut contenders: Vec<Contender<'_, Box<dyn Error>>> =
@@ -174,19 +198,19 @@ fn executors(arguments: &Arguments, objects: usize) -> Result<(), Box<dyn Error>
     Ok(())
 }
 
-/// Seconds of a run with every frame drawn, which must end as the others do.
+/// Seconds of so many frames, all drawn, after so many others. They must end as another executor's do.
 fn drawn(
     runner: Runner,
-    objects: usize,
-    frames: u64,
+    scene: ParticleScene,
+    [ahead, frames]: [u64; 2],
     expected: &Cell<Option<End>>,
 ) -> Result<f64, Box<dyn Error>> {
-    let scene = ParticleScene::new(objects);
     let Runner { executor, threads } = runner;
     let settings = Settings { executor, threads, ..Settings::default() };
     let mut manager = VeManager::new(scene.build()?, settings)?;
     let look = Look::room(scene.room());
     let mut offscreen = Offscreen::new(Gpu::new(None)?, look, Quality::Fast, SIZE)?;
+    manager.run(ahead, &mut NullRenderer::new(), &mut |_| ())?;
     manager.run(WARM_UP, &mut offscreen, &mut |_| ())?;
     let began = Instant::now();
     manager.run(frames, &mut offscreen, &mut |_| ())?;
