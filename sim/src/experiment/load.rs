@@ -2,6 +2,7 @@
 
 use super::error::ExperimentError;
 use super::race::{Race, Runner, WARM_UP};
+use super::statistics::Quartiles;
 use super::subject::Subject;
 use super::work::{SEED, spin, steps_per_second};
 use crate::object::Object;
@@ -10,7 +11,7 @@ use crate::render::{NullRenderer, Renderer};
 /// The share of a serial frame's work that the stand-in is to make of rendering; usually 0.15. What it came to is
 /// [`Outcome::render_share`](super::outcome::Outcome::render_share).
 pub const RENDER_SHARE: f64 = 0.15;
-/// Runs from which the share is calibrated; the one of the fewest steps counts.
+/// Runs from which the share is calibrated, and pairs of runs by which that is corrected.
 const RUNS: usize = 5;
 
 /// What rendering costs.
@@ -64,14 +65,16 @@ impl StandIn {
         let steps_per_second = || steps_per_second(|steps| _ = spin(steps, SEED));
         let mut before = steps_per_second();
         for _ in 0..RUNS {
-            let seconds = serial_frame(subject, frames)?;
+            let seconds = serial_frame(0, subject, frames)?;
             let after = steps_per_second();
             // The speed beside the run, for a machine that is slow for a while is slow in both; the higher of two, and
             // the fewest steps, for what disturbs spinning or a run alone slows it.
             frame_steps = frame_steps.min(seconds * before.max(after));
             before = after;
         }
-        Ok(Self::of(steps_of_a_draw(frame_steps, subject.objects())))
+        let steps = steps_of_a_draw(frame_steps, subject.objects());
+        // Some of them are done beside what comes before or after, and the fewest are few.
+        Ok(Self::of(corrected(steps, share_of(steps, subject, frames)?)))
     }
 
     fn of(steps: u64) -> Self {
@@ -92,9 +95,30 @@ fn steps_of_a_draw(frame_steps: f64, objects: usize) -> u64 {
     (frame_steps * RENDER_SHARE / (1.0 - RENDER_SHARE) / objects as f64) as u64
 }
 
-/// Seconds of a serial frame without rendering.
-fn serial_frame(subject: &Subject, frames: u64) -> Result<f64, ExperimentError> {
-    let (subject, load) = (subject.clone(), RenderLoad::StandIn(StandIn::of(0)));
+/// The share of a serial frame's work that drawing makes with so many steps: the median of pairs of runs.
+fn share_of(steps: u64, subject: &Subject, frames: u64) -> Result<f64, ExperimentError> {
+    let pairs = (0..RUNS).map(|_| {
+        let [bare, drawn] = [0, steps].map(|steps| serial_frame(steps, subject, frames));
+        Ok(1.0 - bare? / drawn?)
+    });
+    let shares: Result<Vec<f64>, ExperimentError> = pairs.collect();
+    Ok(Quartiles::of(shares?).map_or(f64::NAN, |shares| shares.median))
+}
+
+/// Steps that make [`RENDER_SHARE`] where so many came to a share that is not. What is not between none and all, or
+/// asks for less than half or more than twice as many, has been disturbed.
+fn corrected(steps: u64, came_to: f64) -> u64 {
+    if !(came_to > 0.0 && came_to < 1.0) {
+        return steps;
+    }
+    let odds = |share: f64| share / (1.0 - share);
+    let factor = odds(RENDER_SHARE) / odds(came_to);
+    (steps as f64 * factor.clamp(0.5, 2.0)).round() as u64
+}
+
+/// Seconds of a serial frame whose rendering makes so many steps for each object.
+fn serial_frame(steps: u64, subject: &Subject, frames: u64) -> Result<f64, ExperimentError> {
+    let (subject, load) = (subject.clone(), RenderLoad::StandIn(StandIn::of(steps)));
     let race = Race { subject, load, warm_up: WARM_UP, frames, rounds: 1..=1 };
     Ok(race.seconds(Runner::SERIAL)? / frames as f64)
 }
@@ -118,6 +142,15 @@ mod tests {
         let mut stand_in = StandIn::of(3);
         scene.objects.iter().take(2).for_each(|object| stand_in.draw(object));
         assert_eq!(stand_in.state, spin(6, SEED));
+    }
+
+    #[test]
+    fn a_share_is_corrected_as_far_as_it_can_be_true() {
+        let share = |steps: u64| steps as f64 / (steps as f64 + 5_600.0);
+        let steps = corrected(900, share(900));
+        assert!((share(steps) - RENDER_SHARE).abs() < 1e-4, "{steps}");
+        let disturbed = [-0.1, 0.0, 0.001, 0.9, 1.0, f64::NAN];
+        assert_eq!(disturbed.map(|share| corrected(100, share)), [100, 100, 200, 50, 100, 100]);
     }
 
     #[test]
