@@ -250,9 +250,14 @@ pub(super) fn advance_alone(
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
+    use super::super::Fixed;
     use super::*;
     use crate::blocking::Grain;
     use crate::executor::{Executor, SerialExecutor};
+    use crate::geometry::{Geometry, Rigid, Topology};
+    use crate::object::Group;
     use crate::render::NullRenderer;
     use crate::scene::ParticleScene;
 
@@ -298,6 +303,38 @@ mod tests {
             let one_long = std::iter::once(1_000).chain((0..others).map(|_| 1));
             assert_eq!(first_of(one_long), (1, HALF), "{others} others");
         }
+    }
+
+    /// How many of chains are alike that have these topologies and dampings, beside a wall.
+    fn alike_of(chains: &[(&Arc<Topology>, f32)]) -> usize {
+        let object = |(id, (topology, damping)): (usize, &(&Arc<Topology>, f32))| {
+            let nodes = topology.nodes();
+            let mesh =
+                Mesh::new(Arc::clone(topology), &vec![Vec3::ZERO; nodes], &vec![1.0; nodes], 0.1);
+            let springs = MassSpring::new(1.0, *damping, 1).expect("positive values");
+            let geometry = Geometry::Mesh(mesh.expect("a chain"));
+            Object::new(ObjectId(id as u32), Group(0), geometry, springs)
+        };
+        let wall = Geometry::Rigid(Rigid::wall(Vec3::ZERO, Vec3::Y));
+        let wall = Object::new(ObjectId(chains.len() as u32), Group(0), wall, Fixed);
+        let objects: Vec<Object> = chains.iter().enumerate().map(object).chain([wall]).collect();
+        alike(objects.iter())
+    }
+
+    #[test]
+    fn bodies_of_one_topology_and_all_damped_or_none_are_alike() {
+        let chain = |nodes: usize| {
+            let places: Vec<Vec3> = (0..nodes).map(|node| Vec3::X * node as f32).collect();
+            Arc::new(Topology::new(&places, Vec::new(), &[[0, 1]], false).expect("a chain"))
+        };
+        let [one, other, most, more] = [9, 9, MOST_NODES, MOST_NODES + 1].map(chain);
+        assert_eq!(alike_of(&[]), 0, "a wall");
+        assert_eq!(alike_of(&[(&one, 0.0); 3]), 3);
+        assert_eq!(alike_of(&[(&one, 0.1), (&one, 0.2)]), 2);
+        assert_eq!(alike_of(&[(&one, 0.1), (&one, 0.0)]), 0);
+        assert_eq!(alike_of(&[(&one, 0.0), (&other, 0.0)]), 0);
+        assert_eq!(alike_of(&[(&most, 0.0); 2]), 2);
+        assert_eq!(alike_of(&[(&more, 0.0); 2]), 0);
     }
 
     #[test]
