@@ -152,6 +152,11 @@ impl Registers {
     }
 }
 
+/// Measures what has to be known of this machine's registers, unless it is known.
+pub(super) fn measure_registers() {
+    Registers::of(Simd::detect());
+}
+
 /// How many of the first bodies are best advanced together, and in how many lanes, of which there are at most
 /// as many as registers hold: those that cost least of what they would in full lanes.
 fn together(bodies: &[Waiting], registers: Registers) -> (usize, usize) {

@@ -78,7 +78,7 @@ impl Workspace {
         springs.abreast.reserve(room.abreast);
         if room.abreast > 0 {
             // Now, and not in a frame.
-            abreast::cost_of_all_lanes();
+            batch::measure_registers();
         }
         workspace
     }

@@ -9,8 +9,9 @@ use crate::behavior::spring_kernel::Springs;
 use crate::geometry::{Extent, Mesh, Topology, edges, icosphere};
 use crate::simd::{HALF, Simd};
 
-/// How many times as much it may be: less than nothing more is a mistake, and more than twice nobody would pay.
+/// The least that it may be: all lanes do half of them, too. What came to less was disturbed.
 const LEAST: f32 = 1.0;
+/// The most: at twice as much half of them are done one after the other.
 const MOST: f32 = 2.0;
 /// What it is taken for where it cannot be measured; usually 1.5.
 const USUAL: f32 = 1.5;
