@@ -37,7 +37,7 @@ static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 const SIZE: (u32, u32) = (320, 180);
 
 /// Frames that are not drawn, ahead of all that are; usually 500. Particles start close together, and drawing is a few
-/// hundredths of what they take while they come apart; then it is some 15.
+/// hundredths of what they take while they come apart; then it is some 12 to 20.
 const AHEAD: u64 = 500;
 
 /// Substeps that particles can make.

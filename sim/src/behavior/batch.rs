@@ -152,9 +152,11 @@ impl Registers {
     }
 }
 
-/// Measures what has to be known of this machine's registers, unless it is known.
+/// Measures what is to be known of this machine's registers, unless it is known: ahead of frames, in which it is not.
 pub(super) fn measure_registers() {
-    Registers::of(Simd::detect());
+    if Simd::detect().width() > HALF {
+        abreast::measure_cost_of_all_lanes();
+    }
 }
 
 /// How many of the first bodies are best advanced together, and in how many lanes, of which there are at most
@@ -310,29 +312,29 @@ mod tests {
         }
     }
 
-    /// How many of chains are alike that have these topologies and dampings, beside a wall.
-    fn alike_of(chains: &[(&Arc<Topology>, f32)]) -> usize {
+    /// How many of bodies are alike that have these topologies and dampings, beside a wall.
+    fn alike_of(bodies: &[(&Arc<Topology>, f32)]) -> usize {
         let object = |(id, (topology, damping)): (usize, &(&Arc<Topology>, f32))| {
             let nodes = topology.nodes();
             let mesh =
                 Mesh::new(Arc::clone(topology), &vec![Vec3::ZERO; nodes], &vec![1.0; nodes], 0.1);
             let springs = MassSpring::new(1.0, *damping, 1).expect("positive values");
-            let geometry = Geometry::Mesh(mesh.expect("a chain"));
+            let geometry = Geometry::Mesh(mesh.expect("a body"));
             Object::new(ObjectId(id as u32), Group(0), geometry, springs)
         };
         let wall = Geometry::Rigid(Rigid::wall(Vec3::ZERO, Vec3::Y));
-        let wall = Object::new(ObjectId(chains.len() as u32), Group(0), wall, Fixed);
-        let objects: Vec<Object> = chains.iter().enumerate().map(object).chain([wall]).collect();
+        let wall = Object::new(ObjectId(bodies.len() as u32), Group(0), wall, Fixed);
+        let objects: Vec<Object> = bodies.iter().enumerate().map(object).chain([wall]).collect();
         alike(objects.iter())
     }
 
     #[test]
     fn bodies_of_one_topology_and_all_damped_or_none_are_alike() {
-        let chain = |nodes: usize| {
+        let topology = |nodes: usize| {
             let places: Vec<Vec3> = (0..nodes).map(|node| Vec3::X * node as f32).collect();
-            Arc::new(Topology::new(&places, Vec::new(), &[[0, 1]], false).expect("a chain"))
+            Arc::new(Topology::new(&places, Vec::new(), &[[0, 1]], false).expect("a body"))
         };
-        let [one, other, most, more] = [9, 9, MOST_NODES, MOST_NODES + 1].map(chain);
+        let [one, other, most, more] = [9, 9, MOST_NODES, MOST_NODES + 1].map(topology);
         assert_eq!(alike_of(&[]), 0, "a wall");
         assert_eq!(alike_of(&[(&one, 0.0); 3]), 3);
         assert_eq!(alike_of(&[(&one, 0.1), (&one, 0.2)]), 2);

@@ -77,7 +77,6 @@ impl Workspace {
         springs.alone.reserve(room.nodes);
         springs.abreast.reserve(room.abreast);
         if room.abreast > 0 {
-            // Now, and not in a frame.
             batch::measure_registers();
         }
         workspace

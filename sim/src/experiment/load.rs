@@ -55,12 +55,13 @@ pub struct StandIn {
 }
 
 impl StandIn {
-    /// A stand-in that makes rendering [`RENDER_SHARE`] of a subject's serial frame, in the first `frames` after
-    /// [`WARM_UP`]: later ones may take longer or shorter.
+    /// A stand-in that makes rendering [`RENDER_SHARE`] of a subject's serial frame, in the first `frames`, one at least,
+    /// after [`WARM_UP`]: later ones may take longer or shorter.
     ///
     /// # Errors
     /// The environment cannot be built or run.
     pub fn calibrated(subject: &Subject, frames: u64) -> Result<Self, ExperimentError> {
+        let frames = frames.max(1);
         let mut frame_steps = f64::INFINITY;
         let steps_per_second = || steps_per_second(|steps| _ = spin(steps, SEED));
         let mut before = steps_per_second();
@@ -105,8 +106,8 @@ fn share_of(steps: u64, subject: &Subject, frames: u64) -> Result<f64, Experimen
     Ok(Quartiles::of(shares?).map_or(f64::NAN, |shares| shares.median))
 }
 
-/// Steps that make [`RENDER_SHARE`] where so many came to a share that is not. What is not between none and all, or
-/// asks for less than half or more than twice as many, has been disturbed.
+/// Steps that make [`RENDER_SHARE`] where so many came to another share: half as many at least and twice as many at most,
+/// for what asks for more has been disturbed, and as many where the share is not between none and all.
 fn corrected(steps: u64, came_to: f64) -> u64 {
     if !(came_to > 0.0 && came_to < 1.0) {
         return steps;

@@ -16,7 +16,7 @@ use std::ptr;
 use self::measure::measure;
 pub(super) use self::nodes::Body;
 use self::nodes::{Columns, Force, Motion, Node, Set, Weight, exchange, gather, scatter, weigh};
-pub(super) use self::wide::cost_of_all_lanes;
+pub(super) use self::wide::{cost_of_all_lanes, measure_cost_of_all_lanes};
 use super::spring_kernel::Springs;
 use super::spring_law::{Dashpot, Elastic, Law, load, minus, plus, store, times};
 use crate::geometry::{KernelParts, LANES, Lanes, Spring, Topology};
