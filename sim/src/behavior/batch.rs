@@ -152,9 +152,14 @@ impl Registers {
     }
 }
 
+/// Whether this machine has registers of more than [`HALF`] lanes.
+pub(crate) fn has_long_registers() -> bool {
+    Simd::detect().width() > HALF
+}
+
 /// Measures what is to be known of this machine's registers, unless it is known: ahead of frames, in which it is not.
 pub(super) fn measure_registers() {
-    if Simd::detect().width() > HALF {
+    if has_long_registers() {
         abreast::measure_cost_of_all_lanes();
     }
 }

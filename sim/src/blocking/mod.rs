@@ -250,11 +250,11 @@ impl Blocking {
     }
 
     /// Lists what few objects that are in blocks weigh, in the place of where they are: each lane takes as long as the longest
-    /// beside it. Says whether that is better.
+    /// beside it. Says whether that is better: with short registers lanes are few, and full however objects are dealt.
     fn list_by_weight(&mut self, blocks: &[Block]) -> bool {
         let objects: usize = blocks.iter().map(|block| block.ids().len()).sum();
         let most = SINGLE_OBJECTS.min(MOST_BY_WEIGHT * blocks.len());
-        if objects <= blocks.len() || objects > most {
+        if objects <= blocks.len() || objects > most || !batch::has_long_registers() {
             return false;
         }
         self.list(blocks.iter().flat_map(Block::objects).map(|object| {
