@@ -317,7 +317,7 @@ mod tests {
         }
     }
 
-    /// How many of bodies are alike that have these topologies and dampings, beside a wall.
+    /// How many are alike of bodies with these topologies and dampings, and a wall.
     fn alike_of(bodies: &[(&Arc<Topology>, f32)]) -> usize {
         let object = |(id, (topology, damping)): (usize, &(&Arc<Topology>, f32))| {
             let nodes = topology.nodes();
