@@ -283,7 +283,7 @@ pub(crate) fn fold(lanes: Lanes) -> f32 {
 
 /// Lanes made into one number: the lower half is joined with the upper half until one is left.
 #[inline(always)]
-fn fold_by(mut lanes: Lanes, join: impl Fn(f32, f32) -> f32) -> f32 {
+pub(crate) fn fold_by(mut lanes: Lanes, join: impl Fn(f32, f32) -> f32) -> f32 {
     let mut half = LANES / 2;
     while half > 0 {
         for lane in 0..half {
