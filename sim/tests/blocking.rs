@@ -27,8 +27,8 @@ fn number_and_size_of_blocks() {
         (10, 1, 1),
         (30, 2, 2),
         (30, 4, 30),
-        (64, 1, 2),
-        (65, 1, 2),
+        (64, 1, 1),
+        (65, 1, 1),
         (100, 2, 2),
         (200, 2, 4),
         (300, 4, 4),
@@ -39,11 +39,11 @@ fn number_and_size_of_blocks() {
         (300, 16, 16),
         (300, 64, 38),
         (500, 2, 6),
-        (1_000, 2, 10),
+        (1_000, 2, 8),
         (1_000, 16, 16),
-        (4_000, 2, 24),
+        (4_000, 2, 14),
         (4_000, 16, 64),
-        (10_000, 2, 46),
+        (10_000, 2, 28),
     ] {
         let blocks = blocks(particles(objects, false, true).objects, Grain::Spatial, workers);
         assert_eq!(blocks.len(), expected + 1, "{objects} particles, {workers} workers");
@@ -92,8 +92,8 @@ fn fewer_blocks_than_there_are_stay_as_they_are() {
 
 #[test]
 fn blocks_of_particles_are_compact() {
-    let blocks = blocks(particles(1_000, false, true).objects, Grain::Spatial, 1);
-    let particles = &blocks[..10];
+    let blocks = blocks(particles(4_000, false, true).objects, Grain::Spatial, 4);
+    let particles = &blocks[..16];
     let side = |bounds: Bounds| (bounds.max - bounds.min).max_element();
     let widest = particles.iter().map(|block| side(block.bounds())).fold(0.0, f32::max);
     let all = particles.iter().fold(Bounds::EMPTY, |all, block| all.union(&block.bounds()));

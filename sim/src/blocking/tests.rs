@@ -271,7 +271,7 @@ fn scenery(stones: usize, workers: usize) -> Vec<Vec<ObjectId>> {
 
 #[test]
 fn much_scenery_is_grouped_by_place_and_walls_apart() {
-    for (stones, blocks) in [(0, 1), (SINGLE_OBJECTS, 2), (2_500, 1 + 18)] {
+    for (stones, blocks) in [(0, 1), (SINGLE_OBJECTS, 2), (2_500, 1 + 10)] {
         let grouped = scenery(stones, 2);
         assert_eq!(grouped.len(), blocks, "{stones}");
         assert_eq!(grouped.last(), Some(&vec![ObjectId(0)]), "{stones}");
