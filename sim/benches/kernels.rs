@@ -31,7 +31,7 @@ const BODIES: usize = 16;
 const MIXED_BODIES: usize = 64;
 /// So many that the rest of an update (boxes, checks) does not show.
 const SUBSTEPS: u32 = 100;
-/// Blocks of bodies that make few substeps: as many as 300 particles fill.
+/// Blocks of bodies that make few substeps: as some 300 particles fill.
 const BLOCKS: usize = 5;
 /// Frames of them, of which all but the first find them in a cache, as in a scene.
 const FRAMES: u64 = 4;

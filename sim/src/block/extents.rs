@@ -16,7 +16,7 @@ pub(super) struct Extents {
     lane_of: Vec<u32>,
     /// The place of the object in each lane.
     place_of: Vec<u32>,
-    /// Whether those of a chunk are close in space, as far as they have not moved.
+    /// Whether those of a chunk were close in space when that was last looked at.
     arranged: bool,
 }
 
@@ -108,14 +108,18 @@ impl ExtentLanes {
         self.radius[lane] = extent.radius;
     }
 
+    #[inline(always)]
     fn center(&self, lane: usize) -> Vec3 {
-        Vec3::from_array(self.center.map(|component| component[lane]))
+        Vec3::from_array([0, 1, 2].map(|axis| self.center[axis][lane]))
     }
 
     #[inline(always)]
     pub(super) fn at(&self, lane: usize) -> Extent {
-        let center = Vec3::from_array([0, 1, 2].map(|axis| self.center[axis][lane]));
-        Extent { center, radius: self.radius[lane], ..Extent::of_box(self.boxes.at(lane)) }
+        Extent {
+            center: self.center(lane),
+            radius: self.radius[lane],
+            ..Extent::of_box(self.boxes.at(lane))
+        }
     }
 }
 
@@ -185,6 +189,7 @@ impl Extents {
     }
 
     /// The extent at `place`.
+    #[inline(always)]
     pub(super) fn at(&self, place: usize) -> Extent {
         let lane = self.lane_of[place] as usize;
         self.chunks[lane / LANES].at(lane % LANES)
@@ -203,7 +208,7 @@ impl Extents {
         all
     }
 
-    /// Notes that the objects may be at other places.
+    /// Notes that those of a chunk may be close in space no more: others have come, or all have moved.
     pub(super) fn disarrange(&mut self) {
         self.arranged = false;
     }
@@ -221,21 +226,25 @@ impl Extents {
     }
 
     /// How many there are.
+    #[inline(always)]
     pub(super) fn len(&self) -> usize {
         self.lane_of.len()
     }
 
     /// Side by side.
+    #[inline(always)]
     pub(super) fn chunks(&self) -> &[ExtentLanes] {
         &self.chunks
     }
 
     /// The boxes around the chunks, themselves in lanes.
+    #[inline(always)]
     pub(super) fn around(&self) -> &[BoxLanes] {
         &self.around
     }
 
     /// The place of the object in each lane.
+    #[inline(always)]
     pub(super) fn places(&self) -> &[u32] {
         &self.place_of
     }
@@ -293,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn an_order_stays_until_places_change() {
+    fn an_order_stays_until_it_may_be_none() {
         let middle = |place: usize| Vec3::X * place as f32;
         let mut extents = arranged(&(0..32).map(middle).collect::<Vec<_>>());
         let is_in_low_half =

@@ -126,8 +126,10 @@ impl Block {
         self.disordered = true;
     }
 
-    /// Brings its own extent up to date after objects have come and gone.
+    /// Brings its own extent up to date after objects may have come and gone; and has them, for all move, arranged anew by
+    /// the next update.
     pub(crate) fn fit(&mut self) {
+        self.extents.disarrange();
         if self.disordered {
             self.enclose();
         }
@@ -167,7 +169,6 @@ impl Block {
         if !std::mem::take(&mut self.disordered) {
             return;
         }
-        self.extents.disarrange();
         let seat = |(before, object)| Seat { order: Order::of(object), before, is_taken: false };
         order.extend(self.objects.iter().enumerate().map(seat));
         order.sort_unstable_by_key(|seat| seat.order);
@@ -264,130 +265,4 @@ impl Block {
 }
 
 #[cfg(test)]
-mod tests {
-    use proptest::collection::vec;
-    use proptest::prelude::*;
-
-    use super::*;
-    use crate::scene::ParticleScene;
-
-    /// A box somewhere, or that of a solitary object, or a wall's, or one without end.
-    fn any_box() -> impl Strategy<Value = Bounds> {
-        prop_oneof![
-            8 => (place(), place())
-                .prop_map(|(min, size)| Bounds { min, max: min + 0.5 * size.abs() }),
-            1 => Just(Bounds::EMPTY),
-            1 => Just(Bounds::ALL),
-            1 => Just(Bounds { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY }),
-        ]
-    }
-
-    fn place() -> impl Strategy<Value = Vec3> {
-        [-1.0_f32..1.0, -1.0..1.0, -1.0..1.0].prop_map(Vec3::from_array)
-    }
-
-    /// A box, and for some a sphere somewhere.
-    fn any_extent() -> impl Strategy<Value = Extent> {
-        let radius = prop_oneof![0.0..1.0_f32, Just(f32::INFINITY)];
-        (any_box(), place(), radius).prop_map(|(bounds, center, radius)| Extent {
-            center,
-            radius,
-            ..Extent::of_box(bounds)
-        })
-    }
-
-    /// One extent, which is treated for itself, or fewer than `end`.
-    fn extents(end: usize) -> impl Strategy<Value = Vec<Extent>> {
-        prop_oneof![vec(any_extent(), 1), vec(any_extent(), 0..end)]
-    }
-
-    /// A block of which only the extents are looked at.
-    fn block(all: &[Extent]) -> Block {
-        let mut block = Block::default();
-        block.ids.extend((0..all.len() as u32).map(ObjectId));
-        block.extents.resize(all.len());
-        block.extents.arrange(|place| all[place].center);
-        all.iter().enumerate().for_each(|(place, own)| block.extents.set(place, own));
-        block.enclose();
-        block
-    }
-
-    #[test]
-    fn what_an_update_took_is_shared_out_by_substeps() {
-        let scene = ParticleScene { most_substeps: 100, ..ParticleScene::new(20) };
-        let objects = scene.build().expect("a valid scene").objects;
-        let mut block = Block::new(objects.into_iter().take(21).collect());
-        block.note_cost(Duration::from_millis(21));
-        let (wall, bodies): (Vec<_>, Vec<_>) = block.objects().iter().partition(|o| o.is_fixed());
-        assert!(wall.iter().map(|wall| wall.cost()).eq([1e-3]), "nothing is known of it");
-        let total: f32 = bodies.iter().map(|body| body.cost()).sum();
-        assert!((total - 20e-3).abs() < 1e-6, "{total}");
-        let price = |body: &&Object| body.cost() / batch::weight(body).expect("a body");
-        let prices: Vec<f32> = bodies.iter().map(price).collect();
-        assert!(prices.iter().all(|price| (price / prices[0] - 1.0).abs() < 1e-3), "{prices:?}");
-        let costs: Vec<f32> = bodies.iter().map(|body| body.cost()).collect();
-        assert!(costs[0] > 3.0 * costs[19], "{costs:?}");
-    }
-
-    #[test]
-    fn who_moved_is_beside_others_when_costs_are_noted() {
-        let scene = ParticleScene::new(64).build().expect("a valid scene");
-        let mut block = Block::new(scene.objects.into_iter().take(64).collect());
-        // In a row, but anywhere in it: 37 and 64 have no common divisor.
-        let row = |id: u32| id * 37 % 64;
-        for object in &mut block.objects {
-            let to = Vec3::Y * row(object.id().0) as f32 - object.center();
-            let mesh = object.geometry.as_mesh_mut().expect("a particle");
-            for node in 0..mesh.positions.len() {
-                mesh.positions.add(node, to);
-            }
-            object.refit();
-        }
-        let is_arranged = |block: &Block| {
-            let rows = |places: &[u32]| -> Vec<u32> {
-                places.iter().map(|&place| row(block.ids[place as usize].0) / 16).collect()
-            };
-            block
-                .extents
-                .places()
-                .chunks(16)
-                .all(|chunk| rows(chunk).windows(2).all(|two| two[0] == two[1]))
-        };
-        block.refresh();
-        assert!(!is_arranged(&block));
-        block.note_cost(Duration::from_micros(64));
-        block.put_in_order(&mut Vec::new());
-        block.refresh();
-        assert!(is_arranged(&block));
-    }
-
-    proptest! {
-        #[test]
-        fn every_overlap_is_found_once(few in extents(20), many in extents(300)) {
-            let pairs = |one: usize, others: std::ops::Range<usize>| others.map(move |other| [one, other]);
-            let between: Vec<[usize; 2]> = (0..few.len())
-                .flat_map(|one| pairs(one, 0..many.len()))
-                .filter(|&[one, other]| few[one].overlaps(&many[other]))
-                .collect();
-            let within: Vec<[usize; 2]> = (0..many.len())
-                .flat_map(|one| pairs(one, one + 1..many.len()))
-                .filter(|&[one, other]| many[one].overlaps(&many[other]))
-                .collect();
-            let around = *block(&many).extent();
-            let reaches = few.iter().any(|own| own.overlaps(&around));
-            for simd in Simd::available() {
-                let (mut found, mut found_within) = (Vec::new(), Vec::new());
-                block(&few).overlaps(simd, &block(&many), &mut found);
-                block(&many).overlaps_within(simd, &mut found_within);
-                for pair in &mut found_within {
-                    pair.sort_unstable();
-                }
-                found.sort_unstable();
-                found_within.sort_unstable();
-                prop_assert_eq!(&found, &between);
-                prop_assert_eq!(&found_within, &within);
-                prop_assert_eq!(block(&few).reaches(simd, &around), reaches);
-            }
-        }
-    }
-}
+mod tests;

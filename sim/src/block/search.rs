@@ -86,18 +86,18 @@ fn overlaps<I: Isa>(
 ) {
     let first_chunk = first / LANES;
     for (group, around) in extents.around().iter().enumerate().skip(first_chunk / LANES) {
-        let near = around.hits(isa, &one.bounds) & from(first_chunk, group * LANES);
+        let near = around.hits(isa, &one.bounds) & at_least(first_chunk, group * LANES);
         for chunk in lanes(near).map(|chunk| group * LANES + chunk) {
             let start = chunk * LANES;
-            let others = lanes(extents.chunks()[chunk].hits(isa, one) & from(first, start));
+            let others = lanes(extents.chunks()[chunk].hits(isa, one) & at_least(first, start));
             let place_of = |lane: usize| extents.places()[start + lane] as usize;
             found.extend(others.map(|lane| [place as usize, place_of(lane)]));
         }
     }
 }
 
-/// The lanes of those from `start` on that are from `first` on.
+/// Of the lanes from number `start` on those whose number is `first` or greater.
 #[inline(always)]
-fn from(first: usize, start: usize) -> LaneSet {
+fn at_least(first: usize, start: usize) -> LaneSet {
     !first_lanes(first.saturating_sub(start))
 }

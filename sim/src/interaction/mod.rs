@@ -64,8 +64,8 @@ pub trait Response: Send + Sync {
 const NODES: usize = 256;
 
 /// Pairs of objects whose extents overlap, of two blocks or within one, for which there is room from the start,
-/// likewise; usually 4,096, some twenty for each of two hundred objects.
-const PAIRS: usize = 4_096;
+/// likewise; usually 8,192, some twenty for each of four hundred objects.
+const PAIRS: usize = 8_192;
 
 /// Memory that the interactions of one worker use one after the other.
 #[derive(Debug)]
