@@ -136,9 +136,8 @@ proptest! {
             let (mut found, mut found_within) = (Vec::new(), Vec::new());
             few.overlaps(simd, &many, &mut found);
             many.overlaps_within(simd, &mut found_within);
-            for pair in &mut found_within {
-                pair.sort_unstable();
-            }
+            // In no particular order.
+            found_within.iter_mut().for_each(|pair| pair.sort_unstable());
             found.sort_unstable();
             found_within.sort_unstable();
             prop_assert_eq!(&found, &between);

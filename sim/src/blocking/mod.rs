@@ -58,8 +58,8 @@ const FEWEST_TOGETHER: usize = 10;
 /// several would follow each other are full however they are dealt.
 const MOST_BY_WEIGHT: usize = 24;
 /// Blocks for each object to the power of 2/3; usually 0.06. Were all tested with all, that power would keep the tests
-/// between blocks and those within in balance; as most are passed over, half as many blocks or twice as many take as long
-/// within some hundredths.
+/// between blocks and those within in balance; as most are passed over, half as many blocks take as long, and twice as many
+/// some hundredths longer.
 const BLOCKS: f64 = 0.06;
 /// The fewest blocks for each worker, so that whoever is done can help out another, if each has [`FULL`] objects: with
 /// emptier lanes more is lost than that gains, and one for each worker is better.
