@@ -228,17 +228,17 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
     /// An update at this worker's home.
     #[inline]
     fn pop_update(&mut self) -> Option<Work> {
-        let home = self.pipeline.tables.queues.homes.at(self.home);
-        self.pop(home, Stage::Update)
+        self.pop(self.home, Stage::Update)
     }
 
-    /// A work unit of `stage` that is queued at a home or for everybody.
+    /// A work unit of `stage` that is queued at the home of this number, or a rendering.
     #[inline]
-    pub(crate) fn pop(&mut self, home: &Home<'_>, stage: Stage) -> Option<Work> {
-        let interact = &self.pipeline.tables.queues.interact;
+    pub(crate) fn pop(&mut self, number: u32, stage: Stage) -> Option<Work> {
+        let homes = &self.pipeline.tables.queues.homes;
+        let home = homes.at(number);
         match stage {
             Stage::BroadPhase => home.enter.pop().map(|unit| Work::Enter(UnitId(unit))),
-            Stage::Interaction => interact.pop().map(|id| Work::Interact(InteractionId(id))),
+            Stage::Interaction => homes.pop_interaction(number).map(Work::Interact),
             Stage::Update => {
                 let unit = self.come(home).or_else(|| home.update.pop().map(UnitId));
                 unit.map(Work::Update)

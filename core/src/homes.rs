@@ -6,7 +6,7 @@ use crate::error::TableFull;
 use crate::offer::Offer;
 use crate::ring::{IndexRing, QueueSlot};
 use crate::sync::site;
-use crate::unit::UnitId;
+use crate::unit::{InteractionId, UnitId};
 
 /// The most homes that units are shared out to; workers beyond their number share them.
 #[cfg(not(loom))]
@@ -15,10 +15,12 @@ pub const MOST_HOMES: usize = 16;
 #[cfg(loom)]
 pub const MOST_HOMES: usize = 2;
 
-/// What there is to do of the units of one home.
+/// What there is to do of the units of one home, and a part of the interactions.
 #[derive(Debug)]
 pub(crate) struct Home<'m> {
     pub(crate) enter: IndexRing<'m>,
+    /// By their places among this home's: see [`Homes::queue_of`].
+    interact: IndexRing<'m>,
     pub(crate) update: IndexRing<'m>,
     /// Its units of the frame that was opened last, for which nobody has come yet.
     pub(crate) opened: Offer<'m>,
@@ -26,8 +28,18 @@ pub(crate) struct Home<'m> {
 
 impl<'m> Home<'m> {
     /// A home that no unit has yet.
-    pub(crate) fn new(enter: IndexRing<'m>, update: IndexRing<'m>) -> Self {
-        Self { enter, update, opened: Offer::new() }
+    pub(crate) fn new(
+        enter: IndexRing<'m>,
+        interact: IndexRing<'m>,
+        update: IndexRing<'m>,
+    ) -> Self {
+        Self { enter, interact, update, opened: Offer::new() }
+    }
+
+    /// Whether no interaction looks queued: a hint.
+    #[inline]
+    pub(crate) fn has_no_interactions(&self) -> bool {
+        self.interact.looks_empty()
     }
 
     /// Whether no update looks queued, and no unit left to come for: a hint.
@@ -40,6 +52,7 @@ impl<'m> Home<'m> {
 /// All homes, of which there is at least one.
 #[derive(Debug)]
 pub(crate) struct Homes<'m> {
+    count: NonZeroU32,
     first: Home<'m>,
     others: [Option<Home<'m>>; MOST_HOMES - 1],
 }
@@ -49,16 +62,19 @@ impl<'m> Homes<'m> {
         count: usize,
         mut home: impl FnMut() -> Result<Home<'m>, TableFull>,
     ) -> Result<Self, TableFull> {
-        let mut homes = Self { first: home()?, others: [const { None }; MOST_HOMES - 1] };
-        for other in homes.others.iter_mut().take(count.saturating_sub(1)) {
+        let (first, mut others) = (home()?, [const { None }; MOST_HOMES - 1]);
+        let mut homes = NonZeroU32::MIN;
+        for other in others.iter_mut().take(count.saturating_sub(1)) {
             *other = Some(home()?);
+            homes = homes.saturating_add(1);
         }
-        Ok(homes)
+        Ok(Self { count: homes, first, others })
     }
 
     /// The number of homes.
+    #[inline]
     pub(crate) fn count(&self) -> NonZeroU32 {
-        NonZeroU32::MIN.saturating_add(self.iter().skip(1).count() as u32)
+        self.count
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Home<'m>> {
@@ -77,12 +93,26 @@ impl<'m> Homes<'m> {
         others.and_then(Option::as_ref).unwrap_or(&self.first)
     }
 
-    /// All homes, the one of this number before the others.
+    /// The numbers of all homes, from this one round: workers of different homes do not all come to the same one first
+    /// when nothing is left at their own.
     #[inline]
-    pub(crate) fn from(&self, number: u32) -> impl Iterator<Item = &Home<'m>> {
-        let own = self.at(number);
-        let others = self.iter().filter(move |&home| !::core::ptr::eq(home, own));
-        ::core::iter::once(own).chain(others)
+    pub(crate) fn round_from(&self, number: u32) -> impl Iterator<Item = u32> + use<> {
+        (number..self.count.get()).chain(0..number)
+    }
+
+    /// The queue that an interaction goes to, and its place there: to the homes one after the other, by its number. What
+    /// is queued is for whoever has nothing else to do, and in one queue all of those would wait for each other; here
+    /// most find one of those that were found together at home.
+    #[inline]
+    pub(crate) fn queue_of(&self, id: InteractionId) -> (&IndexRing<'m>, u32) {
+        (&self.at(id.0 % self.count).interact, id.0 / self.count)
+    }
+
+    /// An interaction that is queued at the home of this number.
+    #[inline]
+    pub(crate) fn pop_interaction(&self, number: u32) -> Option<InteractionId> {
+        let place = self.at(number).interact.pop()?;
+        Some(InteractionId(place * self.count.get() + number))
     }
 
     /// Lets every home have the units that `home_of` says are its, in the order of their numbers. `order` has a slot
@@ -108,7 +138,49 @@ impl<'m> Homes<'m> {
 #[derive(Debug)]
 pub(crate) struct Queues<'m> {
     pub(crate) homes: Homes<'m>,
-    pub(crate) interact: IndexRing<'m>,
     /// One for each frame in flight (§5.5).
     pub(crate) render: [IndexRing<'m>; 2],
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::ring::slots_for;
+    use std::{vec, vec::Vec};
+
+    fn ring(indices: usize) -> Result<IndexRing<'static>, TableFull> {
+        let slots: Vec<_> = (0..slots_for(indices)).map(|_| QueueSlot::new()).collect();
+        IndexRing::new(Vec::leak(slots))
+    }
+
+    fn homes(count: usize, interactions: usize) -> Homes<'static> {
+        let home = || Ok(Home::new(ring(1)?, ring(interactions.div_ceil(count))?, ring(1)?));
+        Homes::new(count, home).unwrap_or_else(|full: TableFull| panic!("{full}"))
+    }
+
+    #[test]
+    fn interactions_are_spread_over_all_homes() {
+        for (count, interactions) in [(1, 5), (2, 5), (3, 1), (3, 9), (MOST_HOMES, 100)] {
+            let homes = homes(count, interactions);
+            for id in (0..interactions as u32).map(InteractionId) {
+                let (queue, place) = homes.queue_of(id);
+                assert_eq!(queue.push(place), Ok(()), "{id:?} of {interactions} at {count} homes");
+            }
+            let mut left: Vec<_> = (0..interactions as u32).collect();
+            for number in homes.round_from(0) {
+                let found: Vec<_> =
+                    ::core::iter::from_fn(|| homes.pop_interaction(number)).collect();
+                assert!(found.len() <= interactions.div_ceil(count), "no more than others");
+                assert!(homes.at(number).has_no_interactions());
+                left.retain(|&id| !found.contains(&InteractionId(id)));
+            }
+            assert_eq!(left, [], "each comes out as it went in");
+        }
+    }
+
+    #[test]
+    fn round_from_any_home() {
+        let round = |from| homes(3, 0).round_from(from).collect::<Vec<_>>();
+        assert_eq!([round(0), round(1), round(2)], [vec![0, 1, 2], vec![1, 2, 0], vec![2, 0, 1]]);
+    }
 }

@@ -241,19 +241,19 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         (candidates[0].max(candidates[1]) as usize, contacts[0].max(contacts[1]) as usize)
     }
 
-    /// Stages in which work is queued at a home or for everybody; `Render` only for a holder.
+    /// Stages in which work is queued at a home, or is to be rendered; `Render` only for a holder.
     #[inline]
     pub(crate) fn visible(&self, home: &Home<'_>, holder: bool) -> Stages {
         Stages::NONE
             .with_if(Stage::BroadPhase, !home.enter.looks_empty())
-            .with_if(Stage::Interaction, !self.tables.queues.interact.looks_empty())
+            .with_if(Stage::Interaction, !home.has_no_interactions())
             .with_if(Stage::Update, !home.has_no_updates())
             .with_if(Stage::Render, holder && self.render_visible())
     }
 
     /// Stages in which work is queued anywhere; `Render` only for a holder.
     pub(crate) fn visible_anywhere(&self, holder: bool) -> Stages {
-        let homes = self.tables.queues.homes.from(0);
+        let homes = self.tables.queues.homes.iter();
         homes.fold(Stages::NONE, |seen, home| seen.union(self.visible(home, holder)))
     }
 
@@ -269,7 +269,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
         let queues = &self.tables.queues;
         let (queue, index) = match work {
             Work::Enter(unit) => (&self.home_of(unit).enter, unit.0),
-            Work::Interact(id) => (&queues.interact, id.0),
+            Work::Interact(id) => queues.homes.queue_of(id),
             Work::Update(unit) => (&self.home_of(unit).update, unit.0),
             Work::Render(unit) => (&queues.render[self.rendered_frame(unit).parity()], unit.0),
         };

@@ -6,6 +6,7 @@ use crate::countdown::Countdown;
 use crate::environment::Environment;
 use crate::inbox::{Inbox, LetterSlot};
 use crate::pending::Pending;
+use crate::pipeline::MOST_HOMES;
 use crate::ring::{QueueSlot, slots_for};
 use crate::sync::{Atomic, Cell, const_fn, site};
 use crate::unit::{NONE, UnitId};
@@ -199,10 +200,15 @@ pub(crate) unsafe fn at<T>(table: &[T], index: usize) -> &T {
     unsafe { table.get_unchecked(index) }
 }
 
-/// How many queue slots a pipeline of these sizes needs; it has at least one home.
+/// How many queue slots a pipeline of these sizes needs; it has 1 to [`MOST_HOMES`] homes, the nearest is taken.
 pub const fn queue_slots(units: usize, interactions: usize, letters: usize, homes: usize) -> usize {
-    let homes = if homes == 0 { 1 } else { homes };
-    let rings = 2 * (homes + 1) * slots_for(units) + slots_for(interactions) + slots_for(letters);
+    let homes = match homes {
+        0 => 1,
+        1..MOST_HOMES => homes,
+        _ => MOST_HOMES,
+    };
+    let shared_out = homes * slots_for(interactions.div_ceil(homes));
+    let rings = 2 * (homes + 1) * slots_for(units) + shared_out + slots_for(letters);
     // The lists of arrivals and of homes' units.
     rings + 2 * units
 }

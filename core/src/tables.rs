@@ -88,12 +88,9 @@ impl<'m, E: Environment> Tables<'m, E> {
             slots
         };
         let mut ring = |indices| IndexRing::new(slots(indices));
-        let homes = Homes::new(homes, || Ok(Home::new(ring(units.len())?, ring(units.len())?)))?;
-        let queues = Queues {
-            homes,
-            interact: ring(interactions.len())?,
-            render: [ring(units.len())?, ring(units.len())?],
-        };
+        let (all, shared) = (units.len(), interactions.len().div_ceil(homes));
+        let homes = Homes::new(homes, || Ok(Home::new(ring(all)?, ring(shared)?, ring(all)?)))?;
+        let queues = Queues { homes, render: [ring(all)?, ring(all)?] };
         let post = Post::new(letters, slots(letters.len()))?;
         let (cells, rest) = rest.split_at_mut_checked(units.len()).unwrap_or_default();
         let arrivals = Arrivals::new(cells);

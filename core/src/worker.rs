@@ -174,16 +174,18 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         }
         // Visible work may be gone when it is popped: look again, but no stage more than once,
         // so that a step is bounded.
-        for (place, home) in pipeline.tables.queues.homes.from(self.carry.home).enumerate() {
+        let homes = &pipeline.tables.queues.homes;
+        for number in homes.round_from(self.carry.home) {
             // Who has nothing left at home may find what takes long: no rendering is to wait for that.
-            if place > 0 && !seeded!(TakesRenderingElsewhere) {
+            if number != self.carry.home && !seeded!(TakesRenderingElsewhere) {
                 self.carry.queue_kept();
             }
             for _ in Stage::ALL {
-                let Some(stage) = migrate(self.stage, pipeline.visible(home, holder)) else {
+                let Some(stage) = migrate(self.stage, pipeline.visible(homes.at(number), holder))
+                else {
                     break;
                 };
-                if let Some(work) = self.carry.pop(home, stage) {
+                if let Some(work) = self.carry.pop(number, stage) {
                     return Some(work);
                 }
             }

@@ -11,7 +11,7 @@ use dualframe_core::frame::Frame;
 use dualframe_core::inbox::{From as Sender, LetterSlot};
 use dualframe_core::inputs::Inputs;
 use dualframe_core::latest::Latest;
-use dualframe_core::pipeline::{BroadPhase, Config, Pipeline};
+use dualframe_core::pipeline::{BroadPhase, Config, MOST_HOMES, Pipeline};
 use dualframe_core::ring::QueueSlot;
 use dualframe_core::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
 use dualframe_core::unit::UnitId;
@@ -309,8 +309,15 @@ fn memory_that_does_not_fit() {
     assert_eq!(good.refused(), None);
     let needed = queue_slots(5, 20, 3, 1);
     // Two queues of the home and two of rendering; interactions; free letters; arrivals and the home's units.
-    assert_eq!(needed, 4 * 8 + 32 + 4 + 2 * 5);
-    assert_eq!(queue_slots(5, 20, 3, 3), needed + 2 * 2 * 8, "two for each home");
+    let [of_units, others] = [8, 4 + 2 * 5];
+    assert_eq!(needed, 4 * of_units + 32 + others);
+    assert_eq!(
+        queue_slots(5, 20, 3, 3),
+        8 * of_units + 3 * 8 + others,
+        "seven interactions at each"
+    );
+    let most = queue_slots(5, 65, 3, MOST_HOMES);
+    assert_eq!(queue_slots(5, 65, 3, MOST_HOMES + 1), most, "there are no more homes than that");
     assert_eq!(queue_slots(5, 20, 3, 0), needed, "there is always one home");
     for queues in [0, needed - 1] {
         let few = Sizes { queues: Some(queues), ..good.clone() };
