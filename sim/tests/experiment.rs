@@ -81,9 +81,9 @@ fn all_experiments() {
     }
     assert!(page.contains("seed 3"));
     assert!(page.contains("Table 1: seconds that each worker worked per stage over "));
-    assert!(page.contains("draws on it. Frames 33 to 34 of the "));
-    assert_eq!(page.matches("Frames 33 to 37, 2 rounds of each size. ").count(), 3);
-    assert_eq!(page.matches("Frames 33 to 37. ").count(), 4);
+    assert!(page.contains("draws on it. Frames 65 to 66 of the "));
+    assert_eq!(page.matches("Frames 65 to 69, 2 rounds of each size. ").count(), 3);
+    assert_eq!(page.matches("Frames 65 to 69. ").count(), 4);
 }
 
 #[test]

@@ -45,8 +45,9 @@ pub enum BlockingError {
     },
 }
 
-/// The frames between two regroupings, usually 32: in so many a particle moves by a fraction of a block.
-pub const FRAMES_PER_BLOCKING: u64 = FRAMES_PER_NOTE;
+/// The frames between two regroupings, usually 64: in so many a particle moves by a fraction of a block. All workers but
+/// one wait meanwhile, so that the more there are the more each costs; two are as fast with 32, within a hundredth.
+pub const FRAMES_PER_BLOCKING: u64 = 2 * FRAMES_PER_NOTE;
 
 /// Objects up to which each is a block of its own, unless they are [alike](batch::alike): few objects are usually heavy
 /// ones, and blocks of them would be too.

@@ -17,7 +17,7 @@ use crate::blocking::FRAMES_PER_BLOCKING;
 use crate::executor::{ExecutorError, ExecutorKind, FrameRecord};
 use crate::manager::VeManager;
 
-/// Frames before the clock starts; usually 32: then caches are warm, and blocks are formed anew, for the first time
+/// Frames before the clock starts; usually 64: then caches are warm, and blocks are formed anew, for the first time
 /// with what updates take known to who goes by it.
 pub const WARM_UP: u64 = FRAMES_PER_BLOCKING;
 
