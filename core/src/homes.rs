@@ -19,7 +19,7 @@ pub const MOST_HOMES: usize = 2;
 #[derive(Debug)]
 pub(crate) struct Home<'m> {
     pub(crate) enter: IndexRing<'m>,
-    /// By their places among this home's: see [`Homes::queue_of`].
+    /// By their places among those that come to this home: see [`Homes::queue_of`].
     interact: IndexRing<'m>,
     pub(crate) update: IndexRing<'m>,
     /// Its units of the frame that was opened last, for which nobody has come yet.
@@ -100,9 +100,9 @@ impl<'m> Homes<'m> {
         (number..self.count.get()).chain(0..number)
     }
 
-    /// The queue that an interaction goes to, and its place there: to the homes one after the other, by its number. What
-    /// is queued is for whoever has nothing else to do, and in one queue all of those would wait for each other; here
-    /// most find one of those that were found together at home.
+    /// The queue that an interaction goes to, one home's after the other's by its number, and its place among those that
+    /// come there. They are queued for whoever has nothing else to do, and in one queue for all workers these would wait
+    /// for each other; of several that were found together most find one at home.
     #[inline]
     pub(crate) fn queue_of(&self, id: InteractionId) -> (&IndexRing<'m>, u32) {
         (&self.at(id.0 % self.count).interact, id.0 / self.count)

@@ -273,7 +273,7 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
             Work::Update(unit) => (&self.home_of(unit).update, unit.0),
             Work::Render(unit) => (&queues.render[self.rendered_frame(unit).parity()], unit.0),
         };
-        // A queue has a slot for every index of its table.
+        // A queue has a slot for everything that may come to it.
         let _fits = queue.push(index);
     }
 
