@@ -4,8 +4,7 @@ use std::time::Duration;
 
 /// Of so many frames one is timed; usually 4.
 const FRAMES_PER_TIMING: u64 = 4;
-/// What was timed in so many frames is noted as one; usually 32: blocks are formed anew half as
-/// often.
+/// What was timed in so many frames is noted as one; usually 32: blocks are formed anew half as often.
 pub(crate) const FRAMES_PER_NOTE: u64 = 32;
 /// The frames of these that are timed: all but the first, for which little is in the caches.
 const TIMINGS: usize = (FRAMES_PER_NOTE / FRAMES_PER_TIMING) as usize - 1;
