@@ -6,7 +6,7 @@ use heapless::{Deque, Vec};
 use crate::environment::Environment;
 use crate::homes::Home;
 use crate::pipeline::Pipeline;
-use crate::stage::{Stage, Stages};
+use crate::stage::Stage;
 use crate::sync::{fence, seeded, site};
 use crate::unit::{InteractionId, UnitId, Work};
 use crate::wait::Waiting;
@@ -353,9 +353,9 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         }
         // Whoever still counts this worker among the sleepers has queued its work before this.
         fence(site::FENCE_LEAVE);
-        let left = self.pipeline.visible_anywhere(true);
-        *self.calls_for(Stage::Render) += u32::from(left.contains(Stage::Render));
-        self.queued += u32::from(left.without(Stage::Render) != Stages::NONE);
+        let has_rendering = self.pipeline.render_visible();
+        *self.calls_for(Stage::Render) += u32::from(has_rendering);
+        self.queued += u32::from(self.pipeline.visible_anywhere(self.home));
         self.announce();
     }
 

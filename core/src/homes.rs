@@ -47,6 +47,11 @@ impl<'m> Home<'m> {
     pub(crate) fn has_no_updates(&self) -> bool {
         self.opened.looks_empty() && self.update.looks_empty()
     }
+
+    /// Whether anything looks queued, or there are units left to come for: a hint.
+    pub(crate) fn has_work(&self) -> bool {
+        !(self.has_no_updates() && self.has_no_interactions() && self.enter.looks_empty())
+    }
 }
 
 /// All homes, of which there is at least one.

@@ -251,10 +251,11 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
             .with_if(Stage::Render, holder && self.render_visible())
     }
 
-    /// Stages in which work is queued anywhere; `Render` only for a holder.
-    pub(crate) fn visible_anywhere(&self, holder: bool) -> Stages {
-        let homes = self.tables.queues.homes.iter();
-        homes.fold(Stages::NONE, |seen, home| seen.union(self.visible(home, holder)))
+    /// Whether anything but a rendering is queued at any home, or to be come for; looked for from this home round, and no
+    /// farther than to the first: each line that is looked at comes from another core.
+    pub(crate) fn visible_anywhere(&self, from: u32) -> bool {
+        let homes = &self.tables.queues.homes;
+        homes.round_from(from).map(|number| homes.at(number)).any(Home::has_work)
     }
 
     #[inline]

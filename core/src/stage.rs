@@ -47,20 +47,6 @@ impl Stages {
         Self(self.0 | u8::from(condition) << stage as u8)
     }
 
-    /// What is in either set.
-    #[inline]
-    #[must_use]
-    pub fn union(self, other: Self) -> Self {
-        Self(self.0 | other.0)
-    }
-
-    /// This set less `stage`.
-    #[inline]
-    #[must_use]
-    pub fn without(self, stage: Stage) -> Self {
-        Self(self.0 & !(1 << stage as u8))
-    }
-
     /// Whether `stage` is in the set.
     #[inline]
     pub fn contains(self, stage: Stage) -> bool {
@@ -84,18 +70,12 @@ mod tests {
             let only = Stages::NONE.with_if(stage, true);
             assert!(!only.is_empty() && Stages::NONE.is_empty());
             assert_eq!(Stages::NONE.with_if(stage, false), Stages::NONE);
-            assert_eq!(
-                (only.with_if(stage, true), only.union(only)),
-                (only, only),
-                "once is enough"
-            );
+            assert_eq!(only.with_if(stage, true), only, "once is enough");
             for other in Stage::ALL {
                 let both = only.with_if(other, true);
-                assert_eq!(both, only.union(Stages::NONE.with_if(other, true)));
+                assert_eq!(both, Stages::NONE.with_if(other, true).with_if(stage, true));
                 assert_eq!(only.contains(other), other == stage);
                 assert!(both.contains(stage) && both.contains(other));
-                let rest = if other == stage { Stages::NONE } else { only };
-                assert_eq!((both.without(other), only.without(other)), (rest, rest));
             }
         }
     }

@@ -200,7 +200,8 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         let renders = self.token.is_some() || pipeline.shared.is_free();
         !self.carry.is_empty()
             || (self.carry.renders_shared && !seeded!(SleepsWithRenderer))
-            || !pipeline.visible_anywhere(renders).is_empty()
+            || (renders && pipeline.render_visible())
+            || pipeline.visible_anywhere(self.carry.home)
             || pipeline.finished()
     }
 
