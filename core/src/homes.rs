@@ -1,5 +1,6 @@
 //! Homes, and the queues between stages.
 
+use ::core::iter;
 use ::core::num::NonZeroU32;
 
 use crate::error::TableFull;
@@ -83,12 +84,12 @@ impl<'m> Homes<'m> {
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Home<'m>> {
-        ::core::iter::once(&self.first).chain(self.others.iter().map_while(Option::as_ref))
+        iter::once(&self.first).chain(self.others.iter().map_while(Option::as_ref))
     }
 
     fn iter_mut(&mut self) -> impl Iterator<Item = &mut Home<'m>> {
         let others = self.others.iter_mut().map_while(Option::as_mut);
-        ::core::iter::once(&mut self.first).chain(others)
+        iter::once(&mut self.first).chain(others)
     }
 
     /// A home that there is, by its number.
@@ -98,11 +99,13 @@ impl<'m> Homes<'m> {
         others.and_then(Option::as_ref).unwrap_or(&self.first)
     }
 
-    /// The numbers of all homes, from this one round: workers of different homes do not all come to the same one first
-    /// when nothing is left at their own.
+    /// The numbers of the homes at which whoever is at home at this one looks for work: its own, the others round from there,
+    /// so that workers of different homes do not all come to the same one first, and its own again after each of those. With
+    /// many homes a round takes long, and of what there is at home meanwhile nobody else has the data in a cache.
     #[inline]
     pub(crate) fn round_from(&self, number: u32) -> impl Iterator<Item = u32> + use<> {
-        (number..self.count.get()).chain(0..number)
+        let others = (number + 1..self.count.get()).chain(0..number);
+        iter::once(number).chain(others.flat_map(move |other| [other, number]))
     }
 
     /// The queue that an interaction goes to, one home's after the other's by its number, and its place among those that
@@ -173,8 +176,7 @@ mod tests {
             }
             let mut left: Vec<_> = (0..interactions as u32).collect();
             for number in homes.round_from(0) {
-                let found: Vec<_> =
-                    ::core::iter::from_fn(|| homes.pop_interaction(number)).collect();
+                let found: Vec<_> = iter::from_fn(|| homes.pop_interaction(number)).collect();
                 assert!(found.len() <= interactions.div_ceil(count), "no more than others");
                 assert!(homes.at(number).has_no_interactions());
                 left.retain(|&id| !found.contains(&InteractionId(id)));
@@ -184,8 +186,10 @@ mod tests {
     }
 
     #[test]
-    fn round_from_any_home() {
-        let round = |from| homes(3, 0).round_from(from).collect::<Vec<_>>();
-        assert_eq!([round(0), round(1), round(2)], [vec![0, 1, 2], vec![1, 2, 0], vec![2, 0, 1]]);
+    fn round_from_any_home_by_way_of_that() {
+        let round = |homes_count, from| homes(homes_count, 0).round_from(from).collect::<Vec<_>>();
+        assert_eq!([round(1, 0), round(2, 1)], [vec![0], vec![1, 0, 1]]);
+        let rounds = [vec![0, 1, 0, 2, 0], vec![1, 2, 1, 0, 1], vec![2, 0, 2, 1, 2]];
+        assert_eq!([round(3, 0), round(3, 1), round(3, 2)], rounds);
     }
 }
