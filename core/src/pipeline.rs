@@ -251,8 +251,8 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
             .with_if(Stage::Render, holder && self.render_visible())
     }
 
-    /// Whether anything but a rendering is queued at any home, or to be come for; looked for from this home round, and no
-    /// farther than to the first: each line that is looked at comes from another core.
+    /// Whether anything but a rendering is queued at any home, or to be come for. It is looked for from this home round, and
+    /// no farther than to what is seen first: what is looked at elsewhere comes from other cores.
     pub(crate) fn visible_anywhere(&self, from: u32) -> bool {
         let homes = &self.tables.queues.homes;
         homes.round_from(from).map(|number| homes.at(number)).any(Home::has_work)

@@ -172,10 +172,9 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
         if let Some(work) = self.carry.take() {
             return Some(work);
         }
-        // Visible work may be gone when it is popped: look again, but no stage more than once,
-        // so that a step is bounded.
+        // Visible work may be gone when it is popped: look again, but only so often, so that a step is bounded.
         let homes = &pipeline.tables.queues.homes;
-        for number in homes.round_from(self.carry.home) {
+        for number in homes.round_by_way_of(self.carry.home) {
             // Who has nothing left at home may find what takes long: no rendering is to wait for that.
             if number != self.carry.home && !seeded!(TakesRenderingElsewhere) {
                 self.carry.queue_kept();

@@ -84,9 +84,10 @@ const LOOK: u32 = 10 + (2 + POP + 1 + PUSH);
 /// Coming for a unit of an open frame.
 const COME: u32 = 4;
 /// Rendering is looked for first, then anything at home and elsewhere, and at most four times at each visit
-/// what was seen may be gone; so may its units be that are to be come for. One at home may be passed on.
+/// what was seen may be gone; so may its units be that are to be come for, which those of another frame follow. One at home
+/// may be passed on.
 fn find(units: u32) -> u32 {
-    13 + 4 * (VISITS * LOOK + units * COME) + EMIT
+    13 + 4 * (VISITS * LOOK + HOMES as u32 * units * COME) + EMIT
 }
 /// A shared renderer is put back, and a rendering looked for behind a fence.
 const PUT_BACK: u32 = 1 + 1 + 3;
@@ -95,7 +96,8 @@ const PUT_BACK: u32 = 1 + 1 + 3;
 const SHARE_RENDERER: u32 = 3 + PUT_BACK + 2 + PUT_BACK;
 /// Looks at all queues of a home, whose units all wait for more, and once again when they have been come for.
 const LOOK_IN_VAIN: u32 = 22;
-/// Where nobody takes away what was seen, and something is found: a rendering without coming for units.
+/// Where nobody takes away what was seen, and something is found, at the last other home: nothing comes to its own
+/// meanwhile. A rendering is found without coming for units.
 fn find_alone(units: u32, stage: Stage) -> u32 {
     let comes = if stage == Stage::Render { 0 } else { units * COME + EMIT };
     3 + (VISITS - 2) * 10 + LOOK + comes
