@@ -77,17 +77,14 @@ const POP: u32 = 3;
 const EMIT: u32 = 3 + PUSH;
 /// One fence, two bells.
 const ANNOUNCE: u32 = 5;
-/// How often homes are looked at in a step: the worker's own again after each other one.
-const VISITS: u32 = 2 * HOMES as u32 - 1;
 /// Looks at all queues and an offer, and pops from the one chosen; a rendering of another frame goes back.
 const LOOK: u32 = 10 + (2 + POP + 1 + PUSH);
 /// Coming for a unit of an open frame.
 const COME: u32 = 4;
-/// Rendering is looked for first, then anything at home and elsewhere, and at most four times at each visit
-/// what was seen may be gone; so may its units be that are to be come for, which those of another frame follow. One at home
-/// may be passed on.
+/// Rendering is looked for first, then anything at home and elsewhere, and at most four times at each home
+/// what was seen may be gone; so may its units be that are to be come for. One at home may be passed on.
 fn find(units: u32) -> u32 {
-    13 + 4 * (VISITS * LOOK + HOMES as u32 * units * COME) + EMIT
+    13 + 4 * (HOMES as u32 * LOOK + units * COME) + EMIT
 }
 /// A shared renderer is put back, and a rendering looked for behind a fence.
 const PUT_BACK: u32 = 1 + 1 + 3;
@@ -96,11 +93,10 @@ const PUT_BACK: u32 = 1 + 1 + 3;
 const SHARE_RENDERER: u32 = 3 + PUT_BACK + 2 + PUT_BACK;
 /// Looks at all queues of a home, whose units all wait for more, and once again when they have been come for.
 const LOOK_IN_VAIN: u32 = 22;
-/// Where nobody takes away what was seen, and something is found, at the last other home: nothing comes to its own
-/// meanwhile. A rendering is found without coming for units.
+/// Where nobody takes away what was seen, and something is found: a rendering without coming for units.
 fn find_alone(units: u32, stage: Stage) -> u32 {
     let comes = if stage == Stage::Render { 0 } else { units * COME + EMIT };
-    3 + (VISITS - 2) * 10 + LOOK + comes
+    3 + (HOMES as u32 - 1) * 10 + LOOK + comes
 }
 /// Once round a loop whose word another thread changed.
 const RETRY: u32 = 4;
@@ -213,7 +209,7 @@ fn in_vain() {
         let Cost { accesses, retries } = meter(false).expect("it was started");
         assert!(matches!(found, Ok(Step::Idle)) && retries == 0);
         // It counts itself among the hungry.
-        let most = 13 + VISITS * LOOK_IN_VAIN + setup.units * COME + 1;
+        let most = 13 + HOMES as u32 * LOOK_IN_VAIN + setup.units * COME + 1;
         assert!(accesses <= most, "a step of {accesses} accesses, {most} are allowed");
         assert!(2 * accesses > most, "a bound that says little: {accesses} of {most}");
     });
