@@ -1,18 +1,18 @@
 //! Results of interactions: the paper's temp buffers (§5.6), one pool for each frame in flight.
 //!
 //! Response never writes into an object. It pushes records; the updates of the two objects read
-//! them. A push claims room by one counter and is then contiguous; an interaction's pushes are
+//! them. A push claims [`room`](crate::room) and is then contiguous; an interaction's pushes are
 //! chained. The pool of a frame is emptied when the next frame opens, when all its readers are
 //! done.
 
 use ::core::cell::UnsafeCell;
 use ::core::mem::MaybeUninit;
-use ::core::ops::Range;
 
 use crate::error::{Table, TableFull};
 use crate::frame::Frame;
+use crate::room::FrameRoom;
 use crate::storage::at;
-use crate::sync::{Atomic, CachePadded, Cell, const_fn, site};
+use crate::sync::{CachePadded, Cell, const_fn};
 use crate::unit::NONE;
 
 /// Memory of one result record. Contiguous and unwatched by loom: the segment that covers it is
@@ -64,90 +64,19 @@ impl Default for SegmentSlot {
     }
 }
 
-/// How much of a frame's table is taken, and how much more was asked for.
-#[derive(Debug)]
-pub(crate) struct Room {
-    used: Atomic,
-    /// Slots that were asked for in vain. It only serves to name the capacity needed.
-    refused: Atomic,
-}
-
-impl Room {
-    pub(crate) fn new() -> Self {
-        Self { used: Atomic::new(0), refused: Atomic::new(0) }
-    }
-
-    pub(crate) fn reset(&self) {
-        self.used.store(0, site::POOL_RESET);
-        self.refused.store(0, site::POOL_RESET);
-    }
-
-    /// Slots taken so far.
-    fn used(&self) -> u32 {
-        self.used.load(site::POOL_CLAIM)
-    }
-
-    /// Slots asked for so far, also in vain.
-    pub(crate) fn asked(&self) -> u32 {
-        self.used().saturating_add(self.refused.load(site::POOL_CLAIM))
-    }
-
-    /// Claims `count` slots, or none: exactly, so that a refused claim costs no room and no number
-    /// of refusals can make the counter wrap.
-    #[inline]
-    pub(crate) fn claim(&self, count: u32, capacity: u32, table: Table) -> Result<u32, TableFull> {
-        let mut start = self.used();
-        while capacity.saturating_sub(start) >= count {
-            match self.used.exchange(start, start + count, site::POOL_CLAIM) {
-                Ok(_) => return Ok(start),
-                Err(found) => start = found,
-            }
-        }
-        Err(self.refuse(count, start, capacity, table))
-    }
-
-    /// Claims `count` slots, or as many as are left, and says what is missing.
-    pub(crate) fn claim_some(
-        &self,
-        count: u32,
-        capacity: u32,
-        table: Table,
-    ) -> (Range<u32>, Result<(), TableFull>) {
-        let mut start = self.used();
-        loop {
-            let taken = count.min(capacity.saturating_sub(start));
-            match self.used.exchange(start, start + taken, site::POOL_CLAIM) {
-                Ok(_) if taken == count => return (start..start + taken, Ok(())),
-                Ok(_) => {
-                    let full = self.refuse(count - taken, start + taken, capacity, table);
-                    return (start..start + taken, Err(full));
-                }
-                Err(found) => start = found,
-            }
-        }
-    }
-
-    /// Notes that `count` slots were asked for in vain.
-    fn refuse(&self, count: u32, used: u32, capacity: u32, table: Table) -> TableFull {
-        let refused = self.refused.fetch_add(count, site::POOL_CLAIM) as usize;
-        let needed = (used as usize).saturating_add(refused).saturating_add(count as usize);
-        TableFull { table, capacity: capacity as usize, needed }
-    }
-}
-
 /// The two frames' pools: even frames have the first half of the slots, odd ones the second.
 #[derive(Debug)]
 pub(crate) struct Pools<'m, C> {
     contacts: &'m [ContactSlot<C>],
     segments: &'m [SegmentSlot],
-    rooms: [CachePadded<Room>; 2],
+    rooms: [CachePadded<FrameRoom>; 2],
     /// Slots of one frame.
     half: u32,
 }
 
 impl<'m, C: Copy> Pools<'m, C> {
     pub(crate) fn new(contacts: &'m [ContactSlot<C>], segments: &'m [SegmentSlot]) -> Self {
-        let rooms = [Room::new(), Room::new()].map(CachePadded::new);
+        let rooms = [FrameRoom::new(), FrameRoom::new()].map(CachePadded::new);
         let half = (contacts.len().min(segments.len()) / 2) as u32;
         Self { contacts, segments, rooms, half }
     }
@@ -166,8 +95,10 @@ impl<'m, C: Copy> Pools<'m, C> {
     fn write(&self, frame: Frame, records: &[C]) -> Result<u32, TableFull> {
         // A longer slice cannot fit either, and is named by the length that does not.
         let length = u32::try_from(records.len()).unwrap_or(u32::MAX);
-        let claimed = self.rooms[frame.parity()].claim(length, self.half, Table::Contacts)?;
-        let start = claimed + frame.parity() as u32 * self.half;
+        let room = &self.rooms[frame.parity()];
+        let (claimed, outcome) = room.claim(length, self.half, Table::Contacts);
+        outcome?;
+        let start = claimed.start + frame.parity() as u32 * self.half;
         // SAFETY: `claim` gave this range, which is within the frame's half, to this call alone, until
         // `reset`, which happens after the last reader; the slots are contiguous and `transparent`.
         unsafe {
@@ -210,7 +141,7 @@ impl<'a, 'm, C: Copy> Contacts<'a, 'm, C> {
     /// pushed together: claiming room takes as long for one record as for many.
     ///
     /// # Errors
-    /// [`TableFull`] if the frame's pool has no room; nothing is written then.
+    /// [`TableFull`] if the frame's pool has no room for all; nothing is written then, nor by later pushes of the frame.
     #[inline]
     pub fn push(&mut self, records: &[C]) -> Result<(), TableFull> {
         if !records.is_empty() {
@@ -297,7 +228,10 @@ mod tests {
         let mut pushed = Contacts::new(&pools, Frame(0));
         let full = TableFull { table: Table::Contacts, capacity: 4, needed: 5 };
         assert_eq!(pushed.push(&[1, 2, 3, 4, 5]), Err(full));
-        assert_eq!((pushed.first(), pools.rooms[0].used(), pools.asked(Frame(0))), (NONE, 0, 5));
+        assert_eq!((pushed.first(), pools.asked(Frame(0))), (NONE, 5));
+        // What was left is not to be had any more.
+        let full = TableFull { needed: 6, ..full };
+        assert_eq!((pushed.push(&[1]), pools.asked(Frame(0))), (Err(full), 6));
     }
 
     #[test]

@@ -117,6 +117,8 @@ faults! {
     ArrivalNotRetried;
     /// A pop that lost its race hands its index out all the same.
     PopNotRetried;
+    /// A refused claim takes back what it added to the counter.
+    RefusedClaimTakenBack;
     /// A letter that lost its race counts as posted.
     LetterNotRetried;
     /// A letter is processed in the frame it was posted in.

@@ -50,12 +50,12 @@
 //! | §5.3 thread migration (Fig. 8) | [`migrate`], [`worker`] |
 //! | §5.4 synchronisation | [`countdown`], [`arrivals`], [`offer`] |
 //! | §5.5 consecutive frames | [`frame`] |
-//! | §5.6 temp buffers, preallocation | [`contacts`], [`storage`] |
+//! | §5.6 temp buffers, preallocation | [`contacts`], [`room`], [`storage`] |
 //! | §6.1 threads come and go | [`worker`], [`wait`] |
 //! | §6.2 messages | [`inbox`] |
 //! | §6.3 haptics | [`latest`] |
 //! | Table 1 | [`probe`] |
-#![cfg_attr(not(loom), no_std)]
+#![cfg_attr(not(any(loom, shuttle)), no_std)]
 #![deny(clippy::unwrap_used, clippy::expect_used)]
 
 #[cfg(target_pointer_width = "16")]
@@ -87,12 +87,15 @@ pub mod instrument;
 pub mod latest;
 mod list;
 pub mod migrate;
+#[cfg(shuttle)]
+pub mod observer;
 pub mod offer;
 mod pending;
 pub mod pipeline;
 pub mod probe;
 mod protocol;
 pub mod ring;
+pub mod room;
 pub mod stage;
 pub mod storage;
 // For the models, which name every access; hosts have no use for it.

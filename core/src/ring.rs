@@ -48,12 +48,19 @@ pub const fn slots_for(indices: usize) -> usize {
 #[derive(Debug)]
 pub struct IndexRing<'m> {
     cells: &'m [QueueSlot],
-    /// Next position to pop. A position counts up for ever; its low bits are the slot, its high
-    /// bits the cycle.
-    head: CachePadded<AtomicWord>,
-    /// Next position to push; may lag by one push that has not been helped on yet.
-    tail: CachePadded<AtomicWord>,
+    /// In one cache line: most looks find a ring empty, and learn it from both ends. Who pushes or pops has to have the
+    /// line of a cell anyway.
+    ends: CachePadded<Ends>,
     slot_bits: u32,
+}
+
+/// Positions count up for ever; their low bits are the slot, their high bits the cycle.
+#[derive(Debug)]
+struct Ends {
+    /// Next position to pop.
+    head: AtomicWord,
+    /// Next position to push; may lag by one push that has not been helped on yet, even behind the head.
+    tail: AtomicWord,
 }
 
 impl<'m> IndexRing<'m> {
@@ -83,8 +90,10 @@ impl<'m> IndexRing<'m> {
         }
         Ok(Self {
             cells,
-            head: CachePadded::new(AtomicWord::new(first)),
-            tail: CachePadded::new(AtomicWord::new(first + count)),
+            ends: CachePadded::new(Ends {
+                head: AtomicWord::new(first),
+                tail: AtomicWord::new(first + count),
+            }),
             slot_bits,
         })
     }
@@ -119,13 +128,13 @@ impl<'m> IndexRing<'m> {
             return Err(TableFull { table: Table::Queues, capacity, needed });
         }
         if seeded!(TicketPush) {
-            let place = self.tail.fetch_add(1, site::RING_TAIL_HELP);
+            let place = self.ends.tail.fetch_add(1, site::RING_TAIL_HELP);
             let word = (self.cycle(place) << self.slot_bits) | index;
             self.slot(place).store(word, site::RING_CELL_PUBLISH);
             return Ok(());
         }
         loop {
-            let tail = self.tail.load(site::RING_TAIL_LOAD);
+            let tail = self.ends.tail.load(site::RING_TAIL_LOAD);
             let cell = self.slot(tail);
             let seen = cell.load(site::RING_CELL_LOOK);
             match self.laps_ahead(tail, seen) {
@@ -148,7 +157,7 @@ impl<'m> IndexRing<'m> {
 
     fn help_tail(&self, tail: usize) {
         // Failure means that somebody else helped; either way the tail has moved on.
-        let _ = self.tail.exchange(tail, tail.wrapping_add(1), site::RING_TAIL_HELP);
+        let _ = self.ends.tail.exchange(tail, tail.wrapping_add(1), site::RING_TAIL_HELP);
     }
 
     /// Takes the oldest index; `None` when every push that happened before the call is popped. One
@@ -156,19 +165,19 @@ impl<'m> IndexRing<'m> {
     #[inline]
     pub fn pop(&self) -> Option<u32> {
         loop {
-            let head = self.head.load(site::RING_HEAD_LOAD);
+            let head = self.ends.head.load(site::RING_HEAD_LOAD);
             let word = self.slot(head).load(site::RING_CELL_TAKE);
             match self.laps_ahead(head, word) {
                 0 => {
                     let next = head.wrapping_add(1);
-                    if self.head.exchange(head, next, site::RING_HEAD_CLAIM).is_ok()
+                    if self.ends.head.exchange(head, next, site::RING_HEAD_CLAIM).is_ok()
                         || seeded!(PopNotRetried)
                     {
                         return Some((word & (self.cells.len() - 1)) as u32);
                     }
                 }
                 // Still last lap's: empty, unless the head that was loaded is old.
-                1 if self.head.load(site::RING_HEAD_LOAD) == head => return None,
+                1 if self.ends.head.load(site::RING_HEAD_LOAD) == head => return None,
                 _ => {}
             }
             spin_hint();
@@ -179,9 +188,11 @@ impl<'m> IndexRing<'m> {
     /// push for absent that happened before.
     #[inline]
     pub fn looks_empty(&self) -> bool {
-        let head = self.head.load(site::RING_HEAD_LOAD);
-        let word = self.slot(head).load(site::RING_CELL_LOOK);
-        self.laps_ahead(head, word) == 1
+        let head = self.ends.head.load(site::RING_HEAD_LOAD);
+        let tail = self.ends.tail.load(site::RING_TAIL_LOAD);
+        // A tail behind the head lags behind a push that was popped already; one that is ahead by more than the ring holds
+        // was loaded when the head had moved on.
+        tail.wrapping_sub(head).cast_signed() <= 0
     }
 }
 
@@ -223,6 +234,14 @@ mod tests {
         assert_eq!(IndexRing::holding(5, &mut slots[..3]).map(drop), Err(full(2, 5)));
     }
 
+    /// Pushes `index`, but for the tail, whose position before that it returns.
+    fn publish_only(ring: &IndexRing<'_>, index: usize) -> usize {
+        let tail = ring.ends.tail.load(site::EXCLUSIVE);
+        let word = ring.cycle(tail) << ring.slot_bits | index;
+        ring.slot(tail).store(word, site::EXCLUSIVE);
+        tail
+    }
+
     /// Invariant 7: the cell is written, its pusher sleeps before it moves the tail.
     #[test]
     fn a_pusher_that_is_suspended_stops_nobody() {
@@ -230,11 +249,27 @@ mod tests {
         let ring = IndexRing::new(&mut slots).unwrap_or_else(|full| panic!("{full}"));
         for _lap in 0..3 {
             assert_eq!(ring.push(1), Ok(()));
-            let tail = ring.tail.load(site::EXCLUSIVE);
-            let word = ring.cycle(tail) << ring.slot_bits | 2;
-            ring.slot(tail).store(word, site::EXCLUSIVE);
+            publish_only(&ring, 2);
             assert_eq!(ring.push(3), Ok(()));
             assert_eq!([(); 4].map(|()| ring.pop()), [Some(1), Some(2), Some(3), None]);
+            assert!(ring.looks_empty());
+        }
+    }
+
+    /// A look does not see it, since the push is not over; but a pop has it, and what is pushed next is seen.
+    #[test]
+    fn what_a_suspended_pusher_pushed_is_popped() {
+        let mut slots = [const { QueueSlot::new() }; 4];
+        let ring = IndexRing::new(&mut slots).unwrap_or_else(|full| panic!("{full}"));
+        for _lap in 0..3 {
+            let tail = publish_only(&ring, 2);
+            assert!(ring.looks_empty());
+            assert_eq!((ring.pop(), ring.pop(), ring.looks_empty()), (Some(2), None, true));
+            assert_eq!(ring.push(3), Ok(()));
+            assert!(!ring.looks_empty());
+            assert_eq!((ring.pop(), ring.pop(), ring.looks_empty()), (Some(3), None, true));
+            // Its pusher goes on, and finds that the tail was helped on.
+            ring.help_tail(tail);
             assert!(ring.looks_empty());
         }
     }
@@ -245,8 +280,8 @@ mod tests {
         for popped in start - ring.cells.len()..start {
             ring.slot(popped).store(ring.cycle(popped) << ring.slot_bits, site::EXCLUSIVE);
         }
-        ring.head.store(start, site::EXCLUSIVE);
-        ring.tail.store(start, site::EXCLUSIVE);
+        ring.ends.head.store(start, site::EXCLUSIVE);
+        ring.ends.tail.store(start, site::EXCLUSIVE);
         ring
     }
 
@@ -256,7 +291,7 @@ mod tests {
         // One index at a time first: a lap that is miscounted is seen before a push could look for it for ever.
         for filled in [1, 4] {
             let ring = come_to(usize::MAX - 2 * 4, &mut slots);
-            while ring.cycle(ring.head.load(site::EXCLUSIVE)) != 2 {
+            while ring.cycle(ring.ends.head.load(site::EXCLUSIVE)) != 2 {
                 assert!(ring.looks_empty());
                 assert_eq!(ring.pop(), None);
                 (0..filled).for_each(|index| assert_eq!(ring.push(index), Ok(())));

@@ -65,39 +65,43 @@ pub struct Site {
     pub order: Ordering,
 }
 
-#[cfg(not(any(loom, shuttle)))]
+/// What an access does to the cache line of its word: told to those who watch a schedule.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// It has to be read.
+    Load,
+    /// It is to be written; nobody waits for that.
+    Store,
+    /// It has to be this core's alone: a swap, an addition, a compare-and-swap, be it in vain.
+    Exchange,
+    /// No word: a fence.
+    Fence,
+}
+
 impl Site {
+    /// The order that this access, to `word`, is made with.
+    #[cfg(not(any(loom, shuttle)))]
     #[inline(always)]
-    fn effective(self) -> Ordering {
+    fn effective<T>(self, _: Access, _word: &T) -> Ordering {
         self.order
     }
-}
 
-#[cfg(shuttle)]
-impl Site {
-    /// Lets shuttle schedule another thread before the access, unless the protocol keeps all others
-    /// away from what is accessed: between two accesses that race, those make no difference.
-    fn effective(self) -> Ordering {
-        const UNDISTURBED: [Site; 6] = [
-            site::EXCLUSIVE,
-            site::LIST_LINK,
-            site::LIST_FOLLOW,
-            site::CANDIDATE_HEAD,
-            site::SLOT_FIELD,
-            site::FRAME_TAG,
-        ];
-        if !UNDISTURBED.iter().any(|site| site.name == self.name) {
-            shuttle::sync::atomic::AtomicBool::new(false).load(Ordering::SeqCst);
-        }
+    #[cfg(shuttle)]
+    fn effective<T>(self, access: Access, word: &T) -> Ordering {
+        crate::observer::before(self, access, ::core::ptr::from_ref(word).addr());
         self.order
     }
-}
 
-#[cfg(loom)]
-impl Site {
-    fn effective(self) -> Ordering {
+    #[cfg(loom)]
+    fn effective<T>(self, _: Access, _word: &T) -> Ordering {
         crate::instrument::effective(self)
     }
+}
+
+/// A point at which shuttle may schedule another thread. Unlike `yield_now`, it does not ask for it.
+#[cfg(shuttle)]
+pub fn let_others_run() {
+    shuttle::sync::atomic::AtomicBool::new(false).load(Ordering::SeqCst);
 }
 
 /// Whether a model runs with this bug of `instrument::Fault`; `false` in every other build, which
@@ -132,13 +136,14 @@ sites! {
     /// Acquire: pairs with `RING_TAIL_HELP`. Whoever sees this push also sees the cells before it,
     /// and cannot take the ring for empty because an earlier cell still looks unwritten.
     RING_TAIL_LOAD = Acquire;
-    /// Relaxed: re-validated by the CAS that follows; or a hint, a sleeper's behind `FENCE_SLEEP`.
+    /// Relaxed: re-validated by the CAS that follows.
     RING_CELL_LOOK = Relaxed;
     /// Release: publishes what the pusher wrote about the index to whoever pops it.
     RING_CELL_PUBLISH = Release;
     /// Release: the cell below the new tail was written, or seen written, before.
     RING_TAIL_HELP = Release;
-    /// Relaxed: a hint that is re-validated by the CAS on the head; or a hint only, as `RING_CELL_LOOK`.
+    /// Relaxed: a hint that is re-validated by the CAS on the head; or a hint only, a sleeper's behind
+    /// `FENCE_SLEEP`.
     RING_HEAD_LOAD = Relaxed;
     /// Acquire: pairs with `RING_CELL_PUBLISH`.
     RING_CELL_TAKE = Acquire;
@@ -269,29 +274,29 @@ macro_rules! atomic {
             }
             #[inline(always)]
             pub(crate) fn load(&self, site: Site) -> $int {
-                self.0.load(site.effective())
+                self.0.load(site.effective(Access::Load, &self.0))
             }
             #[inline(always)]
             pub(crate) fn store(&self, value: $int, site: Site) {
-                self.0.store(value, site.effective());
+                self.0.store(value, site.effective(Access::Store, &self.0));
             }
             #[inline(always)]
             pub(crate) fn swap(&self, value: $int, site: Site) -> $int {
-                self.0.swap(value, site.effective())
+                self.0.swap(value, site.effective(Access::Exchange, &self.0))
             }
             #[inline(always)]
             pub(crate) fn fetch_add(&self, value: $int, site: Site) -> $int {
-                self.0.fetch_add(value, site.effective())
+                self.0.fetch_add(value, site.effective(Access::Exchange, &self.0))
             }
             #[inline(always)]
             pub(crate) fn fetch_sub(&self, value: $int, site: Site) -> $int {
-                self.0.fetch_sub(value, site.effective())
+                self.0.fetch_sub(value, site.effective(Access::Exchange, &self.0))
             }
             /// On failure the value found is only a hint for the retry, hence Relaxed.
             #[inline(always)]
             pub(crate) fn exchange(&self, old: $int, new: $int, site: Site) -> Result<$int, $int> {
-                let outcome =
-                    self.0.compare_exchange(old, new, site.effective(), Ordering::Relaxed);
+                let order = site.effective(Access::Exchange, &self.0);
+                let outcome = self.0.compare_exchange(old, new, order, Ordering::Relaxed);
                 #[cfg(loom)]
                 if outcome.is_err() {
                     crate::instrument::retried();
@@ -310,7 +315,7 @@ atomic!(/// A machine word: the ring's cells (cycle and index) and positions.
 /// A fence whose order is a named site.
 #[inline(always)]
 pub(crate) fn fence(site: Site) {
-    let order = site.effective();
+    let order = site.effective(Access::Fence, &());
     // A mutant may turn the fence off; Relaxed is no valid order for one.
     if order != Ordering::Relaxed {
         imp::fence(order);

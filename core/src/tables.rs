@@ -1,7 +1,7 @@
 //! The pipeline's tables: units, interactions, results, letters, and the queues between stages.
 
 use crate::arrivals::Arrivals;
-use crate::contacts::{Pools, Room};
+use crate::contacts::Pools;
 use crate::countdown::Countdown;
 use crate::environment::Environment;
 use crate::error::{SetupError, Table, TableFull};
@@ -11,6 +11,7 @@ use crate::inbox::{From, Inbox, Post, Rejected};
 use crate::list;
 use crate::pending::Pending;
 use crate::ring::{IndexRing, QueueSlot, slots_for};
+use crate::room::FrameRoom;
 use crate::storage::{Chain, InteractionSlot, Memory, UnitSlot, at, queue_slots};
 use crate::sync::{CachePadded, site};
 use crate::unit::{InteractionId, NONE, UnitId};
@@ -23,7 +24,7 @@ pub(crate) struct Gathering {
     /// the frame before is left.
     pub(crate) gate: Countdown,
     /// Candidate slots claimed in each frame in flight (spatial broad phase).
-    found: [Room; 2],
+    found: [FrameRoom; 2],
 }
 
 /// Everything that outlives a frame.
@@ -97,7 +98,7 @@ impl<'m, E: Environment> Tables<'m, E> {
         let order = rest.get(..units.len()).unwrap_or_default();
         let gathering = Gathering {
             gate: Countdown::new(units.len() as u32),
-            found: [Room::new(), Room::new()],
+            found: [FrameRoom::new(), FrameRoom::new()],
         };
         let mut tables = Self {
             units,
@@ -213,7 +214,7 @@ impl<'m, E: Environment + ?Sized> Tables<'m, E> {
     ) -> (impl Iterator<Item = InteractionId> + use<E>, Result<(), TableFull>) {
         let half = (self.interactions.len() / 2) as u32;
         let room = &self.gathering.found[frame.parity()];
-        let (claimed, outcome) = room.claim_some(count, half, Table::Interactions);
+        let (claimed, outcome) = room.claim(count, half, Table::Interactions);
         let first = frame.parity() as u32 * half;
         (claimed.map(move |place| InteractionId(first + place)), outcome)
     }

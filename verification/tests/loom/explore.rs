@@ -20,6 +20,7 @@ explored! {
     countdown: last_sees_all armed_again;
     arrivals: pairs_meet_once next_frame;
     offer: takers_see_what_came_before once_a_round;
+    room: claimed_once;
     inbox: one_letter two_senders this_frame_stays full_pool;
     latest: one_reader slots_are_reused two_readers reader_is_replaced readers_are_limited;
     bell: ring_shows_work all_sleepers_end render_wakes_holders_only leaver_passes_it_on;

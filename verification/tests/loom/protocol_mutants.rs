@@ -41,6 +41,7 @@ fn killer(fault: Fault) -> &'static str {
         TestedTwice => "pipeline::pairwise_after_update",
         ArrivalNotRetried => "arrivals::pairs_meet_once",
         PopNotRetried => "ring::two_consumers",
+        RefusedClaimTakenBack => "room::claimed_once",
         LetterNotRetried => "inbox::two_senders",
         LetterEarly => "inbox::this_frame_stays",
         SlotReusedEarly => "latest::slots_are_reused",

@@ -125,7 +125,7 @@ fn bound(units: u32, did: Did, opens: Option<bool>) -> u32 {
                 + did.found * (17 + EMIT)
                 + gate(opens != Some(false))
         }
-        Stage::Interaction => 4 + 2 * did.pushes + 2 * (1 + EMIT),
+        Stage::Interaction => 4 + 3 * did.pushes + 2 * (1 + EMIT),
         Stage::Update => {
             let candidates = sort(did.candidates, 13) + 6 * did.candidates;
             let letters = 2 + LETTERS * (5 + 3 + PUSH) + sort(LETTERS, 7);

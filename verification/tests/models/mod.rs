@@ -12,6 +12,7 @@ pub(crate) mod latest;
 pub(crate) mod offer;
 pub(crate) mod pipeline;
 pub(crate) mod ring;
+pub(crate) mod room;
 pub(crate) mod shared;
 pub(crate) mod token;
 mod ve;
@@ -157,6 +158,7 @@ pub(crate) fn all() -> impl Iterator<Item = Model> {
         countdown::ALL,
         arrivals::ALL,
         offer::ALL,
+        room::ALL,
         inbox::ALL,
         latest::ALL,
         bell::ALL,
