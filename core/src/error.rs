@@ -45,8 +45,7 @@ pub struct TableFull {
     /// What it holds.
     pub capacity: usize,
     /// Of interactions and contacts: what it would have had to hold for all that was asked of it so far in this
-    /// frame. The last such error of a frame names the capacity needed, or less where smaller requests, of
-    /// contacts, still found room after it; memory takes twice that, for two frames. Of letters, tokens and readers,
+    /// frame. The last such error of a frame names the capacity needed; memory takes twice that, for two frames. Of letters, tokens and readers,
     /// which are given back at any time: one more than there are. Of units: one more than the greatest number asked
     /// for; and at setup, as of queues, what was handed over or what is needed for the rest.
     pub needed: usize,

@@ -175,7 +175,7 @@ pub struct Memory<'m, E: Environment> {
     /// units (and units with themselves) may be candidates in one frame. 65,533 at most where pointers have 32
     /// bits.
     pub interactions: &'m mut [InteractionSlot<E::Interaction>],
-    /// Twice as many as one frame's interactions may push records.
+    /// Twice as many as one frame's interactions may push records. 131,070 at most where pointers have 32 bits.
     pub contacts: &'m mut [ContactSlot<E::Contact>],
     /// As many as `contacts`.
     pub segments: &'m mut [SegmentSlot],

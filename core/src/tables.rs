@@ -11,7 +11,7 @@ use crate::inbox::{From, Inbox, Post, Rejected};
 use crate::list;
 use crate::pending::Pending;
 use crate::ring::{IndexRing, QueueSlot, slots_for};
-use crate::room::FrameRoom;
+use crate::room::{FrameRoom, Room};
 use crate::storage::{Chain, InteractionSlot, Memory, UnitSlot, at, queue_slots};
 use crate::sync::{CachePadded, site};
 use crate::unit::{InteractionId, NONE, UnitId};
@@ -43,6 +43,9 @@ pub(crate) struct Tables<'m, E: Environment + ?Sized> {
 
 /// The largest table whose indices leave room for `NONE` and for doubling.
 const MOST: usize = (u32::MAX / 2) as usize;
+/// Contacts of two frames, each with room of its own.
+const MOST_CONTACTS: usize =
+    if Room::MOST as usize > MOST / 2 { MOST } else { 2 * Room::MOST as usize };
 
 fn check(table: Table, capacity: usize, needed: usize) -> Result<(), TableFull> {
     if needed <= capacity { Ok(()) } else { Err(TableFull { table, capacity, needed }) }
@@ -60,7 +63,7 @@ impl<'m, E: Environment> Tables<'m, E> {
         }
         check(Table::Units, MOST, units.len())?;
         check(Table::Interactions, MOST.min(Pending::MOST_INTERACTIONS), interactions.len())?;
-        check(Table::Contacts, MOST, contacts.len())?;
+        check(Table::Contacts, MOST_CONTACTS, contacts.len())?;
         check(Table::Letters, MOST, letters.len())?;
         let needed = queue_slots(units.len(), interactions.len(), letters.len(), homes);
         check(Table::Queues, queues.len(), needed)?;

@@ -12,7 +12,7 @@ use shuttle::scheduler::{Schedule, Scheduler, Task, TaskId};
 
 use crate::dut;
 
-/// A load, or a store that nobody waits for, of a line that the core has; usually 1 ns.
+/// A load of a line that the core has, or any store, for which it does not wait; usually 1 ns.
 const HIT: u64 = 1;
 /// A read–modify–write in a line that the core has for itself; usually 5 ns.
 const EXCHANGE: u64 = 5;
@@ -35,7 +35,7 @@ pub(crate) struct Model {
     pub(crate) free: Vec<Site>,
 }
 
-/// Who has a line, one bit for each core, and when its last writer is done with it.
+/// Who has a line, one bit for each core, and when it has come to its last writer, who is done with it then.
 #[derive(Clone, Copy, Default)]
 struct Line {
     holders: u64,
@@ -121,8 +121,10 @@ impl Machine {
         let bit = 1 << core;
         let has = line.holders & bit != 0;
         let alone = line.holders == bit;
-        // Whoever writes keeps the line until that is done.
-        let fetched = now.max(line.settled) + self.model.transfer;
+        // Whoever writes keeps the line until that is done; who has stored may still wait for the line to come.
+        let settled = now.max(line.settled);
+        let fetched = settled + self.model.transfer;
+        let own = if alone { settled } else { fetched };
         match access {
             Access::Fence => now + FENCE,
             Access::Load if has => now + HIT,
@@ -131,13 +133,12 @@ impl Machine {
                 fetched
             }
             Access::Store => {
-                *line = Line { holders: bit, settled: if alone { now } else { fetched } };
+                *line = Line { holders: bit, settled: own };
                 now + HIT
             }
             Access::Exchange => {
-                let done = if alone { now } else { fetched } + EXCHANGE;
-                *line = Line { holders: bit, settled: done };
-                done
+                *line = Line { holders: bit, settled: own + EXCHANGE };
+                own + EXCHANGE
             }
         }
     }

@@ -1,7 +1,8 @@
 //! How the core would scale on more cores than there are, and what stops it: its own source in virtual time.
 //!
 //! No kernel of a simulator runs, and no processor reorders anything here: what callbacks and accesses take is said in
-//! `scene.rs` and `machine.rs`. The figures are to be compared with each other, and are the same wherever they are made.
+//! `scene.rs` and `machine.rs`. The figures are to be compared with each other; they are the same each time, but for some
+//! hundredths where memory comes to lie elsewhere.
 #![forbid(unsafe_code)]
 
 use dualframe_core_shuttle as dut;

@@ -7,7 +7,7 @@ use dut::environment::{Environment, Pair};
 use dut::error::TableFull;
 use dut::frame::Frame;
 use dut::inputs::Inputs;
-use dut::pipeline::{Config, Pipeline};
+use dut::pipeline::{Config, MOST_HOMES, Pipeline};
 use dut::ring::QueueSlot;
 use dut::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
 use dut::unit::UnitId;
@@ -49,8 +49,17 @@ pub(crate) struct Scene {
 /// A unit: objects that are close to each other.
 pub(crate) struct Block {
     number: u32,
-    /// Which cores have its objects in their caches, one bit each; by its last updater's alone.
+    /// Which cores have all of its objects in their caches, one bit each: its last updater's, to begin with.
     cached: AtomicU64,
+    /// Which have what others' interactions with it read.
+    border_cached: AtomicU64,
+}
+
+/// What is read of a block.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Part {
+    All,
+    Border,
 }
 
 /// When frames were swapped.
@@ -82,11 +91,24 @@ impl Scene {
         self.objects * time / u64::from(self.blocks)
     }
 
-    /// Has a block's lines come, one in `share` of them, to a core that has not got them.
-    fn bring(&self, block: &Block, share: u64) {
+    /// Has a block's lines come to a core that has not got them: all, or those at its border.
+    fn bring(&self, block: &Block, part: Part) {
         let bit = 1 << core();
-        if block.cached.fetch_or(bit, Ordering::Relaxed) & bit == 0 {
-            spend("data", self.of_block(LINES * self.transfer) / share / AT_A_TIME);
+        let has = |cores: &AtomicU64| cores.load(Ordering::Relaxed) & bit != 0;
+        let border = LINES / READ_BY_OTHERS;
+        let lines = match part {
+            _ if has(&block.cached) => 0,
+            Part::All if has(&block.border_cached) => LINES - border,
+            Part::All => LINES,
+            Part::Border if has(&block.border_cached) => 0,
+            Part::Border => border,
+        };
+        if lines > 0 {
+            spend("data", self.of_block(lines * self.transfer) / AT_A_TIME);
+        }
+        block.border_cached.fetch_or(bit, Ordering::Relaxed);
+        if part == Part::All {
+            block.cached.fetch_or(bit, Ordering::Relaxed);
         }
     }
 
@@ -126,9 +148,11 @@ impl Environment for Scene {
         contacts: &mut Contacts<'_, '_, u64>,
     ) -> Result<(), TableFull> {
         let [first, second] = pair.ends;
-        self.bring(a, READ_BY_OTHERS);
-        if first != second {
-            self.bring(b, READ_BY_OTHERS);
+        if first == second {
+            self.bring(a, Part::All);
+        } else {
+            self.bring(a, Part::Border);
+            self.bring(b, Part::Border);
         }
         // Each block has one interaction within, and four with others, as half of eight are another's.
         let share = if first == second { 2 } else { 8 };
@@ -143,10 +167,11 @@ impl Environment for Scene {
         block: &mut Block,
         inputs: &mut Inputs<'_, '_, Self>,
     ) -> Result<(), TableFull> {
-        self.bring(block, 1);
+        self.bring(block, Part::All);
         let found = inputs.interactions_in_any_order().count();
         assert!(found > 0, "no block is without one");
         *block.cached.get_mut() = 1 << core();
+        *block.border_cached.get_mut() = 1 << core();
         spend("callbacks", self.of_block(UPDATE) * Self::percent(unit, frame) / 100);
         Ok(())
     }
@@ -181,7 +206,13 @@ impl Slots {
         let interactions = 2 * 5 * blocks;
         let contacts = interactions * CONTACTS;
         let queues = queue_slots(blocks, interactions, 0, homes as usize);
-        let block = |number| UnitSlot::new(Block { number, cached: AtomicU64::new(0) });
+        let block = |number| {
+            UnitSlot::new(Block {
+                number,
+                cached: AtomicU64::new(0),
+                border_cached: AtomicU64::new(0),
+            })
+        };
         Self {
             units: (0..scene.blocks).map(block).collect(),
             interactions: (0..interactions).map(|_| InteractionSlot::spare(())).collect(),
@@ -201,6 +232,7 @@ impl Slots {
             letters: &mut [],
             queues: &mut self.queues,
         };
+        let homes = homes.min(MOST_HOMES as u32);
         let config = Config { homes, ..Config::default() };
         let mut pipeline = Pipeline::new(memory, config, Looking).expect("memory that fits");
         pipeline.set_homes(|unit| unit.0 * homes / scene.blocks);
