@@ -43,9 +43,6 @@ pub(crate) struct Tables<'m, E: Environment + ?Sized> {
 
 /// The largest table whose indices leave room for `NONE` and for doubling.
 const MOST: usize = (u32::MAX / 2) as usize;
-/// Contacts of two frames, each with room of its own.
-const MOST_CONTACTS: usize =
-    if Room::MOST as usize > MOST / 2 { MOST } else { 2 * Room::MOST as usize };
 
 fn check(table: Table, capacity: usize, needed: usize) -> Result<(), TableFull> {
     if needed <= capacity { Ok(()) } else { Err(TableFull { table, capacity, needed }) }
@@ -63,7 +60,7 @@ impl<'m, E: Environment> Tables<'m, E> {
         }
         check(Table::Units, MOST, units.len())?;
         check(Table::Interactions, MOST.min(Pending::MOST_INTERACTIONS), interactions.len())?;
-        check(Table::Contacts, MOST_CONTACTS, contacts.len())?;
+        check(Table::Contacts, MOST.min(2 * Room::MOST as usize), contacts.len())?;
         check(Table::Letters, MOST, letters.len())?;
         let needed = queue_slots(units.len(), interactions.len(), letters.len(), homes);
         check(Table::Queues, queues.len(), needed)?;

@@ -4,31 +4,14 @@ use super::{Guarded, Model, Role, check, lend, lend_slice, together};
 use dualframe_core_model::room::Room;
 use std::ops::Range;
 
-pub(crate) const ALL: &[Model] = &[("room::claimed_once", claimed_once::<Room>)];
-
-/// What the models ask of room in a table.
-pub(crate) trait Rooms: 'static {
-    /// Nothing is taken.
-    fn make() -> Self;
-    /// Claims `count` of `capacity` slots, or what is left.
-    fn claim(&self, count: u32, capacity: u32) -> Range<u32>;
-}
-
-impl Rooms for Room {
-    fn make() -> Self {
-        Self::new()
-    }
-    fn claim(&self, count: u32, capacity: u32) -> Range<u32> {
-        Room::claim(self, count, capacity)
-    }
-}
+pub(crate) const ALL: &[Model] = &[("room::claimed_once", claimed_once)];
 
 /// Room for two. One asks for three, one for one, one for one twice: who asks for less than is left gets that, whatever
 /// was refused before, and each slot is one claimer's. The outcome is how many slots each claim got.
-pub(crate) fn claimed_once<R: Rooms>() {
+fn claimed_once() {
     let shares = [[2, 0, 0, 0], [1, 1, 0, 0], [1, 0, 1, 0], [0, 1, 1, 0], [0, 0, 1, 1]];
     check("room::claimed_once", Some(4), 3, shares, |order| {
-        let room = &*lend(R::make());
+        let room = &*lend(Room::new());
         let slots: &[Guarded<u32>] = lend_slice(2, |_| Guarded::new(0));
         let claim = move |count| {
             let claimed = room.claim(count, 2);

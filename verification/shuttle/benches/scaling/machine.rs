@@ -90,6 +90,11 @@ pub(crate) fn now() -> u64 {
     on_machine(|machine| machine.clocks[core()])
 }
 
+/// What it takes to fetch a line from another core, in ns.
+pub(crate) fn transfer() -> u64 {
+    on_machine(|machine| machine.model.transfer)
+}
+
 /// This core does something else for so many ns.
 pub(crate) fn spend(on: &'static str, time: u64) {
     on_machine(|machine| machine.spend(core(), on, time));

@@ -69,21 +69,21 @@ fn main() {
     for &transfer in &arguments.transfer {
         for (objects, blocks) in SIZES {
             let (warm_up, frames) = if arguments.test { (1, 2) } else { (20, 60) };
-            let scene = Scene { objects, blocks, transfer, warm_up, frames };
+            let scene = Scene { objects, blocks, warm_up, frames };
             let model = Model { transfer, free: arguments.free.clone() };
             let (alone, spent) = run(scene, &model, 1);
-            tell(&scene, 1, [alone, alone], &spent);
+            tell(&scene, transfer, 1, [alone, alone], &spent);
             for &workers in &arguments.workers {
                 let (time, spent) = run(scene, &model, workers);
-                tell(&scene, workers, [alone, time], &spent);
+                tell(&scene, transfer, workers, [alone, time], &spent);
             }
         }
     }
 }
 
 /// What a frame takes with one worker and with so many, and what their time went to.
-fn tell(scene: &Scene, workers: u32, [alone, time]: [f64; 2], spent: &Spent) {
-    let Scene { objects, blocks, transfer, .. } = scene;
+fn tell(scene: &Scene, transfer: u64, workers: u32, [alone, time]: [f64; 2], spent: &Spent) {
+    let Scene { objects, blocks, .. } = scene;
     let speed_up = alone / time;
     let efficiency = speed_up / f64::from(workers);
     let mut ways: Vec<_> = spent.iter().collect();

@@ -13,7 +13,7 @@ use dut::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
 use dut::unit::UnitId;
 
 use crate::dut;
-use crate::machine::{Looking, core, forget_spent, now, spend};
+use crate::machine::{Looking, core, forget_spent, now, spend, transfer};
 
 /// What an object's update takes, its bounding box included; usually 650 ns, of a frame of 1 µs an object (DESIGN §7,
 /// "Grain decides", as all of these).
@@ -40,7 +40,6 @@ const CONTACTS: usize = 4;
 pub(crate) struct Scene {
     pub(crate) objects: u64,
     pub(crate) blocks: u32,
-    pub(crate) transfer: u64,
     /// Frames before those that are measured.
     pub(crate) warm_up: u32,
     pub(crate) frames: u32,
@@ -104,7 +103,7 @@ impl Scene {
             Part::Border => border,
         };
         if lines > 0 {
-            spend("data", self.of_block(lines * self.transfer) / AT_A_TIME);
+            spend("data", self.of_block(lines * transfer()) / AT_A_TIME);
         }
         block.border_cached.fetch_or(bit, Ordering::Relaxed);
         if part == Part::All {
