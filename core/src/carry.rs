@@ -27,6 +27,15 @@ const RESERVE: usize = MOST_CARRIED / 8;
 /// every step; beyond it they are queued.
 const MOST_KEPT: usize = MOST_CARRIED.div_ceil(4);
 
+/// Steps in a row that have to find nothing before a worker takes updates of other homes. Usually 32, some microseconds:
+/// the units' data are at the worker of their own home, which is mostly at something short and comes for them next; who
+/// takes one from it makes it take another one's.
+#[cfg(not(loom))]
+const PATIENCE: u32 = 32;
+/// Who finds nothing because of it does what one does whose look came too early.
+#[cfg(loom)]
+const PATIENCE: u32 = 0;
+
 /// Carry-over (§4.2): outputs are carried as long as nobody is hungry; and how many sleepers what was
 /// queued is to wake.
 pub(crate) struct Carry<'p, 'm, E: Environment, W: Waiting> {
@@ -42,6 +51,8 @@ pub(crate) struct Carry<'p, 'm, E: Environment, W: Waiting> {
     renders: u32,
     /// Whether this worker is counted among the hungry.
     hungry: bool,
+    /// Steps that have still to find nothing before this worker takes updates of other homes.
+    patience: u32,
     /// Whether this worker has the shared renderer.
     pub(crate) renders_shared: bool,
     pub(crate) home: u32,
@@ -58,6 +69,7 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
             queued: 0,
             renders: 0,
             hungry: false,
+            patience: PATIENCE,
             renders_shared: false,
             home,
         }
@@ -318,13 +330,20 @@ impl<'p, 'm, E: Environment, W: Waiting> Carry<'p, 'm, E, W> {
         self.pipeline.tables.home_of(unit) != self.home
     }
 
-    /// Counts this worker among the hungry, or not.
+    /// A step has found nothing, which counts this worker among the hungry, or something, or is the last one.
     #[inline]
     pub(crate) fn set_hungry(&mut self, hungry: bool) {
+        self.patience = if hungry { self.patience.saturating_sub(1) } else { PATIENCE };
         if self.hungry != hungry {
             self.hungry = hungry;
             self.pipeline.bells.count_hungry(hungry);
         }
+    }
+
+    /// Whether updates of the home of this number are for this worker now: those of its own are at any time.
+    #[inline]
+    pub(crate) fn takes_updates_of(&self, number: u32) -> bool {
+        number == self.home || self.patience == 0
     }
 
     /// Whom queued work of a stage calls: anyone, but holders alone to render, unless the renderer is shared.

@@ -42,7 +42,8 @@ pub struct Config {
     pub tokens: u32,
     /// How many homes the units are shared out to: 1 to [`MOST_HOMES`], the nearest is taken;
     /// usually one for each worker. A worker does the units of its own home first, in the order of their
-    /// numbers where a frame opens, and then comes to help in others. So what its core has in its cache
+    /// numbers where a frame opens, and then comes to help in others, with updates only after some steps that found
+    /// nothing. So what its core has in its cache
     /// stays there, units that are close in space meet in one cache if the host gives them one home, and
     /// none of the last is long if the host gives long ones low numbers.
     pub homes: u32,
@@ -243,11 +244,11 @@ impl<'m, E: Environment, W: Waiting> Pipeline<'m, E, W> {
 
     /// Stages in which work is queued at a home, or is to be rendered; `Render` only for a holder.
     #[inline]
-    pub(crate) fn visible(&self, home: &Home<'_>, holder: bool) -> Stages {
+    pub(crate) fn visible(&self, home: &Home<'_>, updates: bool, holder: bool) -> Stages {
         Stages::NONE
             .with_if(Stage::BroadPhase, !home.enter.looks_empty())
             .with_if(Stage::Interaction, !home.has_no_interactions())
-            .with_if(Stage::Update, !home.has_no_updates())
+            .with_if(Stage::Update, updates && !home.has_no_updates())
             .with_if(Stage::Render, holder && self.render_visible())
     }
 

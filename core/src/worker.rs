@@ -17,7 +17,8 @@ use crate::wait::{Spin, Waiting};
 pub enum Step {
     /// One work unit of this stage.
     Worked(Stage),
-    /// Nothing: no work was visible. A hint, and may be stale.
+    /// Nothing: no work was visible, but for updates that are left to the workers of other homes for some steps. A hint,
+    /// and may be stale.
     ///
     /// For a worker that has found nothing, others queue what they would else carry on. One that will not step again
     /// for long, as in a task that runs once a period, had better be dropped.
@@ -180,10 +181,9 @@ impl<'p, 'm, E: Environment, W: Waiting, P: Probe> Worker<'p, 'm, E, W, P> {
                 self.carry.queue_kept();
             }
             for _ in Stage::ALL {
-                let Some(stage) = migrate(self.stage, pipeline.visible(homes.at(number), holder))
-                else {
-                    break;
-                };
+                let updates = self.carry.takes_updates_of(number);
+                let visible = pipeline.visible(homes.at(number), updates, holder);
+                let Some(stage) = migrate(self.stage, visible) else { break };
                 if let Some(work) = self.carry.pop(number, stage) {
                     return Some(work);
                 }

@@ -222,13 +222,28 @@ impl Probe for Log {
     }
 }
 
+/// Steps until something is done, be it what was left to the workers of other homes for some steps, or until there is no
+/// cause to step.
+pub(crate) fn next<P: Probe>(
+    worker: &mut Worker<'_, '_, Crowd, &Notes, P>,
+    env: &Crowd,
+) -> Option<Stage> {
+    loop {
+        match worker.step(env).expect("no callback fails") {
+            Step::Worked(stage) => return Some(stage),
+            Step::Idle if worker.has_cause_to_wake() => {}
+            Step::Idle => return None,
+        }
+    }
+}
+
 /// What a worker of `home` does, alone and without a token, until it finds nothing more.
 pub(crate) fn alone(pipeline: &mut Machine<'_, '_>, home: u32, env: &Crowd) -> Vec<Work> {
     pipeline.run(1).expect("at rest");
     let frame = pipeline.frame();
     let mut log = Log::default();
     let mut worker = pipeline.worker_at(home).probed(&mut log);
-    while worker.step(env).expect("no callback fails") != Step::Idle {}
+    while next(&mut worker, env).is_some() {}
     drop(worker);
     assert_eq!(log.begun, log.ended);
     assert!(log.begun.iter().all(|&(_, of)| of == frame));

@@ -16,7 +16,7 @@ use dualframe_tests::watchdog;
 
 use crowd::{
     BREAKS, Crowd, ENTERED, FAR, IDLE, INTERACTED, Log, NEAR, Notes, RENDERED, UPDATED, alone,
-    come_for_all, error, finish, hold, units, with, with_notes,
+    come_for_all, error, finish, hold, next, units, with, with_notes,
 };
 
 #[test]
@@ -37,6 +37,30 @@ fn a_worker_does_the_units_of_its_home_first_and_then_helps() {
     });
 }
 
+/// Its data are in that worker's cache; but one that does not come holds nobody up for long.
+#[test]
+fn an_update_is_left_to_its_home_for_some_steps() {
+    for comes in [true, false] {
+        with(2, 2, 1, |mut pipeline, _| {
+            pipeline.run(1).expect("at rest");
+            let mut first = pipeline.worker_at(0);
+            let done = [ENTERED, ENTERED, UPDATED, IDLE];
+            assert_eq!(done.map(|_| first.step(&FAR)), done, "whatever else there is at once");
+            assert!(first.has_cause_to_wake());
+            if comes {
+                assert_eq!(pipeline.worker_at(1).step(&FAR), UPDATED);
+                assert!(!first.has_cause_to_wake());
+            } else {
+                let left = (0..1000).take_while(|_| first.step(&FAR) == IDLE).count();
+                assert!((8..100).contains(&left), "{left} steps");
+            }
+            assert_eq!(first.step(&FAR), IDLE);
+            drop(first);
+            finish(&pipeline, &FAR);
+        });
+    }
+}
+
 /// A unit that nobody has come for yet is not lost, and none is come for twice.
 #[test]
 fn homes_change_within_an_open_frame() {
@@ -45,14 +69,14 @@ fn homes_change_within_an_open_frame() {
             pipeline.run(2).expect("at rest");
             let mut log = Log::default();
             let mut worker = pipeline.worker().probed(&mut log);
-            (0..steps).for_each(|_| assert_ne!(worker.step(env), IDLE));
+            (0..steps).for_each(|_| assert_ne!(next(&mut worker, env), None));
             drop(worker);
             pipeline.set_homes(|unit| 7 - unit.0);
             let mut worker = pipeline.worker();
             hold(&pipeline, &mut worker);
             let mut worker = worker.probed(&mut log);
             while !pipeline.finished() {
-                assert_ne!(worker.step(env), IDLE, "after {steps} steps");
+                assert_ne!(next(&mut worker, env), None, "after {steps} steps");
             }
             drop(worker);
             for frame in [0, 1].map(Frame) {
