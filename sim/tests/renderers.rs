@@ -151,7 +151,9 @@ impl Renderer for Tells {
 
 #[test]
 fn the_pipeline_renders_on_another_thread_while_the_callers_is_busy() {
-    for fails in [false, true] {
+    for (grain, fails) in
+        [(Grain::Spatial, false), (Grain::Spatial, true), (Grain::Pairwise, false)]
+    {
         let (caller, elsewhere) = (thread::current().id(), Arc::new(Elsewhere::default()));
         let object = |id| {
             let wall = Geometry::Rigid(Rigid::wall(Vec3::ZERO, Vec3::Y));
@@ -159,7 +161,7 @@ fn the_pipeline_renders_on_another_thread_while_the_callers_is_busy() {
         };
         let scene = Scene::new((0..8).map(object).collect(), no_rules());
         let executor = ExecutorKind::Pipeline;
-        let settings = Settings { executor, threads: 2, ..Settings::default() };
+        let settings = Settings { executor, threads: 2, grain, ..Settings::default() };
         let mut manager = VeManager::new(scene, settings).expect("all of it is allowed");
         let mut renderer = Tells { caller, elsewhere: Arc::clone(&elsewhere), fails };
         let run = AssertUnwindSafe(|| manager.run(4, &mut renderer, &mut |_| ()));

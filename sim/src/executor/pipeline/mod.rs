@@ -48,8 +48,7 @@ use crate::timeline::Timeline;
 const MOST_FRAMES: u64 = 1 << 31;
 
 /// Advances an environment by the pipeline. The calling thread is worker number 0; who updates objects renders them,
-/// unless the renderer [is bound](Renderer::is_bound) to the calling thread, or blocks are single objects
-/// ([`Grain::Pairwise`]): then the calling thread does.
+/// unless the renderer [is bound](Renderer::is_bound) to the calling thread: then that does.
 pub struct PipelineExecutor {
     stages: Stages,
     layout: Layout,

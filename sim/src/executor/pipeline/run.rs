@@ -155,8 +155,8 @@ impl<'s> Context<'s, '_> {
     ) -> thread::Result<End> {
         regrouping.settle(&mut pipeline);
         regrouping.post_mail(self.shared.first_frame, self.shared, &pipeline);
-        // Single objects may be rendered sooner than the renderer is passed on.
-        let kept = if screen.renderer.is_bound() || regrouping.blocking.is_none() {
+        // A single worker has nobody to share it with.
+        let kept = if screen.renderer.is_bound() || self.workers == 1 {
             Some(screen)
         } else {
             pipeline.share(screen).err().map(|(screen, _)| screen)
