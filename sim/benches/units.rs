@@ -1,14 +1,21 @@
 //! What an executor costs for each unit and frame: objects that do nothing and meet nobody, so that
 //! everything beyond the serial executor's time is synchronisation.
 //!
-//! Synchronisation is the time of all threads together, less the serial executor's in the same
-//! round, as medians over interleaved rounds. With `--test`, one tiny round.
+//! Synchronisation is the time of all threads together, less the serial executor's in the same round.
+#![forbid(unsafe_code)]
 
-use std::time::{Duration, Instant};
+mod common;
+
+use std::process::ExitCode;
+use std::time::Instant;
 
 use dualframe_sim::behavior::{Behavior, Input};
 use dualframe_sim::blocking::{Blocking, Grain};
-use dualframe_sim::executor::ExecutorKind;
+use dualframe_sim::executor::ExecutorError;
+use dualframe_sim::experiment::calibrator::Calibrator;
+use dualframe_sim::experiment::error::ExperimentError;
+use dualframe_sim::experiment::race::Runner;
+use dualframe_sim::experiment::timing::{Contender, Rounds, Series};
 use dualframe_sim::geometry::{Geometry, Rigid};
 use dualframe_sim::interaction::Rules;
 use dualframe_sim::manager::{Settings, VeManager};
@@ -21,87 +28,80 @@ use glam::{Quat, Vec3};
 use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
-/// As many units for either grain that queues and lists are well filled.
+/// As many objects for either grain that queues and lists are well filled.
 const GRAINS: [(Grain, usize); 2] = [(Grain::Pairwise, 512), (Grain::Spatial, 4_096)];
-const THREADS: [usize; 2] = [1, 2];
 /// Radius of a body, in metres; usually a tenth of the distance to the next.
 const RADIUS: f32 = 0.1;
 /// Distance to the next body, in metres.
 const SPACING: f32 = 1.0;
-/// How long everybody rests before a measurement: OpenMP's threads go on spinning after a loop.
-const REST: Duration = Duration::from_millis(30);
 
-fn main() {
-    let test = std::env::args().any(|argument| argument == "--test");
-    let (rounds, frames) = if test { (1, 16) } else { (15, 320) };
-    println!("{:<10} {:<18} threads  ns a unit and frame", "grain", "executor");
-    println!("{:>42} {:>16}", "elapsed", "synchronisation");
-    for (grain, objects) in GRAINS {
-        let objects = if test { objects / 16 } else { objects };
-        measure(grain, objects, rounds, frames);
-    }
+fn main() -> ExitCode {
+    common::main(units)
 }
 
-/// One executor with its times.
-struct Subject {
-    executor: ExecutorKind,
-    threads: usize,
-    manager: VeManager,
-    elapsed: Vec<f64>,
-}
-
-impl Subject {
-    fn new(executor: ExecutorKind, threads: usize, grain: Grain, objects: usize) -> Self {
-        let settings = Settings { executor, threads, grain, ..Settings::default() };
-        let manager = VeManager::new(idle(objects), settings).expect("all of it is allowed");
-        Self { executor, threads, manager, elapsed: Vec::new() }
-    }
-
-    /// Seconds for so many frames.
-    fn run(&mut self, frames: u64) -> f64 {
-        std::thread::sleep(REST);
-        let began = Instant::now();
-        let ran = self.manager.run(frames, &mut NullRenderer::new(), &mut |_| ());
-        ran.expect("no table is full");
-        began.elapsed().as_secs_f64()
-    }
-}
-
-fn measure(grain: Grain, objects: usize, rounds: usize, frames: u64) {
-    let kinds = ExecutorKind::ALL.iter().copied().filter(|&kind| kind != ExecutorKind::Serial);
-    let several = kinds.flat_map(|kind| THREADS.map(|threads| (kind, threads)));
+fn units(arguments: &common::Arguments) -> Result<(), ExperimentError> {
+    let calibrator = Calibrator::default();
+    let mut threads = vec![1, arguments.threads];
+    threads.dedup();
     // The serial one first: the others are compared with it.
-    let all = std::iter::once((ExecutorKind::Serial, 1)).chain(several);
-    let mut subjects: Vec<_> =
-        all.map(|(kind, threads)| Subject::new(kind, threads, grain, objects)).collect();
-    for subject in &mut subjects {
-        subject.run(frames);
+    let mut runners = vec![Runner::SERIAL];
+    runners.extend(threads.into_iter().flat_map(Runner::parallel));
+    for (grain, objects) in GRAINS {
+        let objects = if arguments.test { objects / 16 } else { objects };
+        let frames = arguments.frames_for(objects, 80_000);
+        let contenders = runners.iter().map(|&runner| contender(runner, grain, objects, frames));
+        let mut contenders = contenders.collect::<Result<Vec<_>, _>>()?;
+        let mut phase = || calibrator.phase();
+        let rounds = arguments.rounds();
+        let series = Series::measure(&mut contenders, rounds, &mut phase, &mut || ())?;
+        print(grain, objects, frames, &runners, &series);
     }
-    for _ in 0..rounds {
-        for subject in &mut subjects {
-            let seconds = subject.run(frames);
-            subject.elapsed.push(seconds);
-        }
-    }
-    let serial = subjects[0].elapsed.clone();
-    for Subject { executor, threads, elapsed, .. } in subjects {
-        let each = 1e9 / (units(grain, objects, threads) as f64 * frames as f64);
-        let beyond = elapsed.iter().zip(&serial).map(|(all, one)| all * threads as f64 - one);
-        let (beyond, elapsed) = (median(beyond.collect()) * each, median(elapsed) * each);
-        let (grain, name) = (format!("{grain:?}"), executor.name());
-        println!("{grain:<10} {name:<18} {threads:>4} {elapsed:>8.0} {beyond:>16.0}");
+    Ok(())
+}
+
+/// An environment that stays, to be run on for so many frames each round.
+fn contender(
+    runner: Runner,
+    grain: Grain,
+    objects: usize,
+    frames: u64,
+) -> Result<Contender<'static>, ExperimentError> {
+    let Runner { executor, threads } = runner;
+    let settings = Settings { executor, threads, grain, ..Settings::default() };
+    let mut manager = VeManager::new(idle(objects), settings).map_err(ExecutorError::from)?;
+    let mut run = move || {
+        let began = Instant::now();
+        manager.run(frames, &mut NullRenderer::new(), &mut |_| ())?;
+        Ok(began.elapsed().as_secs_f64())
+    };
+    // Threads are hired, and memory is there, before the first round.
+    run()?;
+    Ok(Contender { label: runner.label(), spins: runner.spins(), run: Box::new(run) })
+}
+
+fn print(grain: Grain, objects: usize, frames: u64, runners: &[Runner], series: &Series) {
+    println!("\n{grain:?}, {objects} objects, {frames} frames; ns a unit and frame");
+    common::print_phases(series);
+    println!(
+        "{:24}{:>26}{:>26}{:>26}",
+        "", "elapsed, all rounds", "synchronisation, all", "synchronisation, good"
+    );
+    for (index, runner) in runners.iter().enumerate() {
+        let (units, threads) = (units_of(grain, objects, runner.threads), runner.threads as f64);
+        let each = 1e9 / (units as f64 * frames as f64);
+        let elapsed = series.quartiles(Rounds::All, |seconds| seconds[index] * each);
+        let [all, good] = [Rounds::All, Rounds::Good].map(|which| {
+            series.quartiles(which, |seconds| (seconds[index] * threads - seconds[0]) * each)
+        });
+        let [elapsed, all, good] = [elapsed, all, good].map(|values| common::range(values, 0));
+        println!("{:24}{elapsed:>26}{all:>26}{good:>26}", runner.label());
     }
 }
 
 /// The number of units of a scene.
-fn units(grain: Grain, objects: usize, threads: usize) -> usize {
+fn units_of(grain: Grain, objects: usize, threads: usize) -> usize {
     let (_, blocks) = Blocking::new(idle(objects).objects, grain, threads).expect("few objects");
     blocks.len()
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 /// Bodies on a grid that do nothing. No interaction is modelled.

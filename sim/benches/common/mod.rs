@@ -88,8 +88,23 @@ pub(crate) fn main(bench: fn(&Arguments) -> Result<(), ExperimentError>) -> Exit
 /// Prints what was run, what the calibrator saw, and for each contender the time of a frame and how
 /// many times the first contender's it is, over all rounds and over the good ones. A run has so many
 /// frames.
+#[allow(dead_code, reason = "not every bench compares frames")]
 pub(crate) fn print(title: &str, series: &Series, frames: f64) {
     println!("\n{title}");
+    print_phases(series);
+    println!(
+        "{:24}{:>28}{:>26}{:>26}",
+        "", "µs a frame, all rounds", "times the first, all", "times the first, good"
+    );
+    for (index, label) in series.labels().iter().enumerate() {
+        let time = series.quartiles(Rounds::All, |seconds| seconds[index] * 1e6 / frames);
+        let [all, good] = [Rounds::All, Rounds::Good].map(|which| series.ratio(which, index, 0));
+        println!("{label:24}{:>28}{:>26}{:>26}", range(time, 1), range(all, 3), range(good, 3));
+    }
+}
+
+/// Prints what the calibrator saw.
+pub(crate) fn print_phases(series: &Series) {
     let phases = series.rounds().iter().map(|round| round.phase);
     let gain = Quartiles::of(phases.clone().map(|phase| phase.gain));
     let ping_pong = Quartiles::of(phases.map(|phase| phase.ping_pong));
@@ -100,15 +115,6 @@ pub(crate) fn print(title: &str, series: &Series, frames: f64) {
         series.marked(),
         series.rounds().len(),
     );
-    println!(
-        "{:24}{:>28}{:>26}{:>26}",
-        "", "µs a frame, all rounds", "times the first, all", "times the first, good"
-    );
-    for (index, label) in series.labels().iter().enumerate() {
-        let time = series.quartiles(Rounds::All, |seconds| seconds[index] * 1e6 / frames);
-        let [all, good] = [Rounds::All, Rounds::Good].map(|which| series.ratio(which, index, 0));
-        println!("{label:24}{:>28}{:>26}{:>26}", range(time, 1), range(all, 3), range(good, 3));
-    }
 }
 
 /// Quartiles as "median [lower upper]".

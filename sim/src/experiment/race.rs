@@ -54,7 +54,8 @@ impl Runner {
     }
 
     /// Whether its threads may go on spinning after a run. The pipeline's have ended by then.
-    fn spins(self) -> bool {
+    #[must_use]
+    pub fn spins(self) -> bool {
         !matches!(self.executor, ExecutorKind::Serial | ExecutorKind::Pipeline)
     }
 }
