@@ -327,6 +327,11 @@ fn memory_that_does_not_fit() {
     assert_eq!(Sizes { units: 0, ..good.clone() }.refused(), Some(SetupError::NoUnits));
     let unequal = SetupError::UnequalContacts { contacts: 10, segments: 9 };
     assert_eq!(Sizes { segments: 9, ..good }.refused(), Some(unequal));
+    // Where a word has 32 bits refused claims are added to one half of it at most.
+    let narrow = 2 * usize::from(u16::MAX);
+    let wide = Sizes::spatial(5, 20, narrow + 1, 3).refused();
+    let refused = SetupError::Table(full(Table::Contacts, narrow, narrow + 1));
+    assert_eq!(wide, (usize::BITS == 32).then_some(refused));
 }
 
 #[test]
@@ -445,4 +450,8 @@ fn errors_speak() {
     let said = SetupError::from(full(Table::Units, 4, 5)).to_string();
     assert_eq!(said, full(Table::Units, 4, 5).to_string());
     assert!(StillRunning.to_string().contains("still running"));
+    for (tokens, what) in [(0, "without a render token"), (1, "the render token"), (3, "of 3")] {
+        let said = NotShared { tokens }.to_string();
+        assert!(said.contains(what), "{said}");
+    }
 }
