@@ -37,11 +37,12 @@ fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
     for objects in arguments.objects_or(&hundreds) {
         let subject = Subject::Particles(ParticleScene::new(objects));
         let frames = arguments.frames_for(objects, 60_000);
-        let stand_in = StandIn::calibrated(&subject, frames)?;
+        let mut phase = || calibrator.phase();
+        let stand_in = StandIn::calibrated(&subject, frames, arguments.rounds(), &mut phase)?;
         for load in [RenderLoad::Null, RenderLoad::StandIn(stand_in)] {
             let (subject, rounds) = (subject.clone(), arguments.rounds());
             let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };
-            let outcome = race.run(&runners, &mut || calibrator.phase(), &mut || ())?;
+            let outcome = race.run(&runners, &mut phase, &mut || ())?;
             common::print(&race.to_string(), &outcome.series, race.frames as f64);
             let share = 100.0 * outcome.render_share(Rounds::Good).unwrap_or(f64::NAN);
             let over = |other| outcome.median_speed_up(pipeline, other).unwrap_or(f64::NAN);

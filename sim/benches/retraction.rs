@@ -30,10 +30,12 @@ fn retraction(arguments: &common::Arguments) -> Result<(), ExperimentError> {
     let pipeline = Runner::pipeline(arguments.threads);
     let mut runners: Vec<Runner> = Runner::parallel(arguments.threads).collect();
     runners.push(Runner::SERIAL);
-    for load in [RenderLoad::Null, RenderLoad::StandIn(StandIn::calibrated(&subject, frames)?)] {
+    let mut phase = || calibrator.phase();
+    let stand_in = StandIn::calibrated(&subject, frames, arguments.rounds(), &mut phase)?;
+    for load in [RenderLoad::Null, RenderLoad::StandIn(stand_in)] {
         let (subject, rounds) = (subject.clone(), arguments.rounds());
         let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };
-        let outcome = race.run(&runners, &mut || calibrator.phase(), &mut || ())?;
+        let outcome = race.run(&runners, &mut phase, &mut || ())?;
         common::print(&race.to_string(), &outcome.series, race.frames as f64);
         let share = outcome.render_share(Rounds::Good);
         println!("rendering: {:.1} % of the serial work", 100.0 * share.unwrap_or(f64::NAN));

@@ -108,7 +108,9 @@ impl Study<'_> {
         let mut all_rounds = Outcome::rounds_table(rounds);
         let mut figures = Vec::new();
         for (subject, names) in subjects {
-            let stand_in = StandIn::calibrated(&subject, self.frames)?;
+            let (calibrator, rounds) = (laboratory.calibrator, self.rounds..=self.rounds);
+            let stand_in =
+                StandIn::calibrated(&subject, self.frames, rounds, &mut || calibrator.phase())?;
             let mut race = |load| {
                 let (subject, &Self { frames, rounds, .. }) = (subject.clone(), self);
                 let rounds = rounds..=rounds;

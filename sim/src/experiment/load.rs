@@ -1,9 +1,12 @@
 //! What stands in for a graphics device while executors are compared.
 
+use std::ops::RangeInclusive;
+
+use super::calibrator::Phase;
 use super::error::ExperimentError;
 use super::race::{Race, Runner, WARM_UP};
-use super::statistics::Quartiles;
 use super::subject::Subject;
+use super::timing::Rounds;
 use super::work::{SEED, spin, steps_per_second};
 use crate::object::Object;
 use crate::render::{NullRenderer, Renderer};
@@ -11,7 +14,7 @@ use crate::render::{NullRenderer, Renderer};
 /// The share of a serial frame's work that the stand-in is to make of rendering; usually 0.15. What it came to is
 /// [`Outcome::render_share`](super::outcome::Outcome::render_share).
 pub const RENDER_SHARE: f64 = 0.15;
-/// Runs from which the share is calibrated, and pairs of runs by which that is corrected.
+/// Runs from which the share is calibrated.
 const RUNS: usize = 5;
 
 /// What rendering costs.
@@ -56,17 +59,27 @@ pub struct StandIn {
 
 impl StandIn {
     /// A stand-in that makes rendering [`RENDER_SHARE`] of a subject's serial frame, in the first `frames`, one at least,
-    /// after [`WARM_UP`]: later ones may take longer or shorter.
+    /// after [`WARM_UP`]: later ones may take longer or shorter. It is corrected once, by what it comes to in a race of so
+    /// many rounds; `phase` measures the machine's present phase.
     ///
     /// # Errors
     /// The environment cannot be built or run.
-    pub fn calibrated(subject: &Subject, frames: u64) -> Result<Self, ExperimentError> {
+    pub fn calibrated(
+        subject: &Subject,
+        frames: u64,
+        rounds: RangeInclusive<usize>,
+        phase: &mut dyn FnMut() -> Phase,
+    ) -> Result<Self, ExperimentError> {
         let frames = frames.max(1);
+        let race = |steps| {
+            let (subject, load) = (subject.clone(), RenderLoad::StandIn(Self::of(steps)));
+            Race { subject, load, warm_up: WARM_UP, frames, rounds: rounds.clone() }
+        };
         let mut frame_steps = f64::INFINITY;
         let steps_per_second = || steps_per_second(|steps| _ = spin(steps, SEED));
         let mut before = steps_per_second();
         for _ in 0..RUNS {
-            let seconds = serial_frame(0, subject, frames)?;
+            let seconds = race(0).seconds(Runner::SERIAL)? / frames as f64;
             let after = steps_per_second();
             // The speed beside the run, for a machine that is slow for a while is slow in both; the higher of two, and
             // the fewest steps, for what disturbs spinning or a run alone slows it.
@@ -75,10 +88,13 @@ impl StandIn {
         }
         let steps = steps_of_a_draw(frame_steps, subject.objects());
         // Some of them are done beside what comes before or after, and the fewest are few.
-        Ok(Self::of(corrected(steps, share_of(steps, subject, frames)?)))
+        let outcome = race(steps).run(&[Runner::SERIAL], phase, &mut || ())?;
+        let came_to = outcome.render_share(Rounds::Good).unwrap_or(f64::NAN);
+        Ok(Self::of(corrected(steps, came_to)))
     }
 
-    fn of(steps: u64) -> Self {
+    /// One that takes so many steps in each draw.
+    pub(super) fn of(steps: u64) -> Self {
         Self { steps, state: SEED }
     }
 }
@@ -96,16 +112,6 @@ fn steps_of_a_draw(frame_steps: f64, objects: usize) -> u64 {
     (frame_steps * RENDER_SHARE / (1.0 - RENDER_SHARE) / objects as f64) as u64
 }
 
-/// The share of a serial frame's work that drawing makes with so many steps: the median of pairs of runs.
-fn share_of(steps: u64, subject: &Subject, frames: u64) -> Result<f64, ExperimentError> {
-    let pairs = (0..RUNS).map(|_| {
-        let [bare, drawn] = [0, steps].map(|steps| serial_frame(steps, subject, frames));
-        Ok(1.0 - bare? / drawn?)
-    });
-    let shares: Result<Vec<f64>, ExperimentError> = pairs.collect();
-    Ok(Quartiles::of(shares?).map_or(f64::NAN, |shares| shares.median))
-}
-
 /// Steps that make [`RENDER_SHARE`] where so many came to another share: half as many at least and twice as many at most,
 /// for what asks for more has been disturbed, and as many where the share is not between none and all.
 fn corrected(steps: u64, came_to: f64) -> u64 {
@@ -117,13 +123,6 @@ fn corrected(steps: u64, came_to: f64) -> u64 {
     (steps as f64 * factor.clamp(0.5, 2.0)).round() as u64
 }
 
-/// Seconds of a serial frame whose rendering makes so many steps for each object.
-fn serial_frame(steps: u64, subject: &Subject, frames: u64) -> Result<f64, ExperimentError> {
-    let (subject, load) = (subject.clone(), RenderLoad::StandIn(StandIn::of(steps)));
-    let race = Race { subject, load, warm_up: WARM_UP, frames, rounds: 1..=1 };
-    Ok(race.seconds(Runner::SERIAL)? / frames as f64)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -132,7 +131,8 @@ mod tests {
     #[test]
     fn a_calibrated_stand_in_works() {
         let subject = Subject::Particles(ParticleScene::new(5));
-        let stand_in = StandIn::calibrated(&subject, 5).expect("a valid scene");
+        let mut phase = || Phase { gain: 2.0, ping_pong: 100.0 };
+        let stand_in = StandIn::calibrated(&subject, 5, 1..=1, &mut phase).expect("a valid scene");
         assert!(stand_in.steps > 0);
     }
 

@@ -290,8 +290,7 @@ pub(super) mod tests {
     fn with_rendering(with: [f64; 3], without: [f64; 3]) -> Outcome {
         let times = [(Runner::SERIAL, with.to_vec()), (Runner::pipeline(1), without.to_vec())];
         let mut outcome = outcome_by_rounds(12, &times, &[2.0, 2.0, 2.0, 1.0]);
-        let stand_in = StandIn::calibrated(&outcome.race.subject, 1).expect("a valid scene");
-        outcome.race.load = RenderLoad::StandIn(stand_in);
+        outcome.race.load = RenderLoad::StandIn(StandIn::of(1));
         outcome.runners.pop();
         Outcome { without_rendering: Some(1), ..outcome }
     }

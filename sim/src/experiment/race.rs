@@ -252,8 +252,7 @@ mod tests {
     #[test]
     fn what_rendering_takes_is_timed_beside_it() {
         let subject = Subject::Particles(ParticleScene::new(4));
-        let stand_in = StandIn::calibrated(&subject, 1).expect("a valid scene");
-        let load = RenderLoad::StandIn(stand_in);
+        let load = RenderLoad::StandIn(StandIn::of(1));
         let race = Race { subject, load, warm_up: 0, frames: 1, rounds: 1..=1 };
         let run =
             |runners: &[Runner]| race.run(runners, &mut || GOOD, &mut || ()).expect("it runs");
