@@ -10,7 +10,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use dualframe_sim::behavior::{Behavior, Input};
-use dualframe_sim::blocking::{Blocking, Grain};
+use dualframe_sim::blocking::{Blocking, FRAMES_PER_BLOCKING, Grain};
 use dualframe_sim::executor::ExecutorError;
 use dualframe_sim::experiment::calibrator::Calibrator;
 use dualframe_sim::experiment::error::ExperimentError;
@@ -48,7 +48,9 @@ fn units(arguments: &common::Arguments) -> Result<(), ExperimentError> {
     runners.extend(threads.into_iter().flat_map(Runner::parallel));
     for (grain, objects) in GRAINS {
         let objects = if arguments.test { objects / 16 } else { objects };
-        let frames = arguments.frames_for(objects, 80_000);
+        // As many regroupings in each run.
+        let usual = arguments.frames_for(objects, 80_000).next_multiple_of(FRAMES_PER_BLOCKING);
+        let frames = arguments.frames.unwrap_or(usual);
         let contenders = runners.iter().map(|&runner| contender(runner, grain, objects, frames));
         let mut contenders = contenders.collect::<Result<Vec<_>, _>>()?;
         let mut phase = || calibrator.phase();
