@@ -38,7 +38,8 @@ fn compare(arguments: &common::Arguments) -> Result<(), ExperimentError> {
         let subject = Subject::Particles(ParticleScene::new(objects));
         let frames = arguments.frames_for(objects, 60_000);
         let mut phase = || calibrator.phase();
-        let stand_in = StandIn::calibrated(&subject, frames, arguments.rounds(), &mut phase)?;
+        let stand_in =
+            StandIn::calibrated(&subject, frames, arguments.rounds(), &mut phase, &mut || ())?;
         for load in [RenderLoad::Null, RenderLoad::StandIn(stand_in)] {
             let (subject, rounds) = (subject.clone(), arguments.rounds());
             let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };

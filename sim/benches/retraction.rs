@@ -31,7 +31,8 @@ fn retraction(arguments: &common::Arguments) -> Result<(), ExperimentError> {
     let mut runners: Vec<Runner> = Runner::parallel(arguments.threads).collect();
     runners.push(Runner::SERIAL);
     let mut phase = || calibrator.phase();
-    let stand_in = StandIn::calibrated(&subject, frames, arguments.rounds(), &mut phase)?;
+    let stand_in =
+        StandIn::calibrated(&subject, frames, arguments.rounds(), &mut phase, &mut || ())?;
     for load in [RenderLoad::Null, RenderLoad::StandIn(stand_in)] {
         let (subject, rounds) = (subject.clone(), arguments.rounds());
         let race = Race { subject, load, warm_up: WARM_UP, frames, rounds };

@@ -77,8 +77,14 @@ fn rendering(share: f64) -> [String; 2] {
     ]
 }
 
+/// Runs of each subject with these numbers of threads: every executor's in each round, without and with rendering, beside
+/// which the serial version is timed without once more, and those that rendering is calibrated by.
+pub(super) fn runs(threads: &[usize], rounds: usize) -> usize {
+    (2 * runners(threads).len() + 1) * rounds + StandIn::runs_to_calibrate(rounds)
+}
+
 /// The serial executor, and every other with each of these numbers of threads.
-pub(super) fn runners(threads: &[usize]) -> Vec<Runner> {
+fn runners(threads: &[usize]) -> Vec<Runner> {
     let parallel = threads.iter().copied().flat_map(Runner::parallel);
     std::iter::once(Runner::SERIAL).chain(parallel).collect()
 }
@@ -108,9 +114,7 @@ impl Study<'_> {
         let mut all_rounds = Outcome::rounds_table(rounds);
         let mut figures = Vec::new();
         for (subject, names) in subjects {
-            let (calibrator, rounds) = (laboratory.calibrator, self.rounds..=self.rounds);
-            let stand_in =
-                StandIn::calibrated(&subject, self.frames, rounds, &mut || calibrator.phase())?;
+            let stand_in = laboratory.stand_in(&subject, self.frames, self.rounds)?;
             let mut race = |load| {
                 let (subject, &Self { frames, rounds, .. }) = (subject.clone(), self);
                 let rounds = rounds..=rounds;

@@ -60,7 +60,7 @@ pub struct StandIn {
 impl StandIn {
     /// A stand-in that makes rendering [`RENDER_SHARE`] of a subject's serial frame, in the first `frames`, one at least,
     /// after [`WARM_UP`]: later ones may take longer or shorter. It is corrected once, by what it comes to in a race of so
-    /// many rounds; `phase` measures the machine's present phase.
+    /// many rounds; `phase` measures the machine's present phase, `done` is told after each run.
     ///
     /// # Errors
     /// The environment cannot be built or run.
@@ -69,6 +69,7 @@ impl StandIn {
         frames: u64,
         rounds: RangeInclusive<usize>,
         phase: &mut dyn FnMut() -> Phase,
+        done: &mut dyn FnMut(),
     ) -> Result<Self, ExperimentError> {
         let frames = frames.max(1);
         let race = |steps| {
@@ -85,12 +86,18 @@ impl StandIn {
             // the fewest steps, for what disturbs spinning or a run alone slows it.
             frame_steps = frame_steps.min(seconds * before.max(after));
             before = after;
+            done();
         }
         let steps = steps_of_a_draw(frame_steps, subject.objects());
         // Some of them are done beside what comes before or after, and the fewest are few.
-        let outcome = race(steps).run(&[Runner::SERIAL], phase, &mut || ())?;
+        let outcome = race(steps).run(&[Runner::SERIAL], phase, done)?;
         let came_to = outcome.render_share(Rounds::Good).unwrap_or(f64::NAN);
         Ok(Self::of(corrected(steps, came_to)))
+    }
+
+    /// Runs that calibrating one in so many rounds takes: in each the serial version runs with and without it.
+    pub(super) fn runs_to_calibrate(rounds: usize) -> usize {
+        RUNS + 2 * rounds
     }
 
     /// One that takes so many steps in each draw.
@@ -131,9 +138,10 @@ mod tests {
     #[test]
     fn a_calibrated_stand_in_works() {
         let subject = Subject::Particles(ParticleScene::new(5));
-        let mut phase = || Phase { gain: 2.0, ping_pong: 100.0 };
-        let stand_in = StandIn::calibrated(&subject, 5, 1..=1, &mut phase).expect("a valid scene");
-        assert!(stand_in.steps > 0);
+        let (mut phase, mut runs) = (|| Phase { gain: 2.0, ping_pong: 100.0 }, 0);
+        let stand_in = StandIn::calibrated(&subject, 5, 1..=1, &mut phase, &mut || runs += 1);
+        assert!(stand_in.expect("a valid scene").steps > 0);
+        assert_eq!(runs, StandIn::runs_to_calibrate(1));
     }
 
     /// Else a core begins the next draw before it is done with this one, and rendering takes less than it is to take.

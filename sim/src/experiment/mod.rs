@@ -40,10 +40,12 @@ use std::path::Path;
 use self::calibrator::Calibrator;
 use self::error::ExperimentError;
 use self::figure::Figure;
+use self::load::StandIn;
 use self::machine::Machine;
 use self::outcome::Outcome;
 use self::plan::Plan;
 use self::race::{OnFrame, Race, Runner, WARM_UP};
+use self::subject::Subject;
 use self::table::Table;
 
 /// The name of the page.
@@ -84,19 +86,17 @@ impl Experiment {
     /// How much work it is, in particles updated.
     #[must_use]
     pub fn work(self, plan: &Plan) -> u64 {
-        let threads = plan.threads.len();
+        let Plan { threads, scalability, load_balance, per_frame, compare, retraction, .. } = plan;
         match self {
-            Self::Scalability => plan.scalability.work(1 + threads, WARM_UP),
-            Self::LoadBalance => plan.load_balance.work(1, 0),
-            Self::PerFrame => plan.per_frame.work(threads, 0),
-            // Without and with rendering, beside which the serial version is timed without once more.
-            Self::Compare => {
-                let runners = compare::runners(&plan.threads).len();
-                plan.compare.work(2 * runners + 1, WARM_UP)
+            Self::Scalability => {
+                scalability.work((1 + threads.len()) * scalability.rounds, WARM_UP)
             }
+            Self::LoadBalance => load_balance.work(load_balance.rounds, 0),
+            Self::PerFrame => per_frame.work(threads.len() * per_frame.rounds, 0),
+            Self::Compare => compare.work(compare::runs(threads, compare.rounds), WARM_UP),
             Self::Retraction => {
-                let runners = compare::runners(&plan.retraction.threads).len();
-                plan.retraction.work(2 * runners + 1, WARM_UP)
+                let runs = compare::runs(&retraction.threads, retraction.rounds);
+                retraction.work(runs, WARM_UP)
             }
         }
     }
@@ -240,6 +240,19 @@ impl Laboratory<'_> {
         let mut phase = || calibrator.phase();
         let mut done = || self.advance(work);
         race.observed(runners, &mut phase, &mut done, on_frame)
+    }
+
+    /// What stands in for rendering a subject, calibrated in so many rounds.
+    fn stand_in(
+        &mut self,
+        subject: &Subject,
+        frames: u64,
+        rounds: usize,
+    ) -> Result<StandIn, ExperimentError> {
+        let work = subject.work() * (WARM_UP + frames);
+        let calibrator = self.calibrator;
+        let (mut phase, mut done) = (|| calibrator.phase(), || self.advance(work));
+        StandIn::calibrated(subject, frames, rounds..=rounds, &mut phase, &mut done)
     }
 
     fn advance(&mut self, work: u64) {

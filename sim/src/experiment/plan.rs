@@ -17,10 +17,10 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// Objects updated, over all runs of so many runners that warm up for so many frames.
-    pub(super) fn work(&self, runners: usize, warm_up: u64) -> u64 {
+    /// Objects updated, over so many runs with each number of objects that warm up for so many frames.
+    pub(super) fn work(&self, runs: usize, warm_up: u64) -> u64 {
         let objects: usize = self.objects.iter().sum();
-        (objects * runners * self.rounds) as u64 * (self.frames + warm_up)
+        (objects * runs) as u64 * (self.frames + warm_up)
     }
 }
 
@@ -46,9 +46,9 @@ impl Retraction {
         Self { threads: (1..=most.min(MAX_THREADS)).collect(), keeps_core, frames, rounds }
     }
 
-    /// In particles updated, over all runs of so many runners that warm up for so many frames.
-    pub(super) fn work(&self, runners: usize, warm_up: u64) -> u64 {
-        (runners * self.rounds) as u64 * (self.frames + warm_up) * RETRACTION_WORK
+    /// In particles updated, over so many runs that warm up for so many frames.
+    pub(super) fn work(&self, runs: usize, warm_up: u64) -> u64 {
+        runs as u64 * (self.frames + warm_up) * RETRACTION_WORK
     }
 }
 
