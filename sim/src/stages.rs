@@ -234,7 +234,8 @@ impl Stages {
 
     /// Draws the objects of a block.
     pub fn render(&self, block: &Block, renderer: &mut dyn Renderer) {
-        for object in &block.objects {
+        for (place, object) in block.objects.iter().enumerate() {
+            block.prefetch_drawn_after(place);
             draw(object, renderer);
         }
     }

@@ -20,6 +20,10 @@ use crate::simd::{Simd, prefetch};
 /// usually 8.
 const AHEAD: usize = 8;
 
+/// How many objects before it is drawn what renderers read of an object is asked for, and the object itself as many before
+/// that; usually 4: drawing four takes about as long as memory does to answer.
+const AHEAD_OF_DRAWING: usize = 4;
+
 /// A place of a block that is brought into its order: which object is to have it, and where that was before.
 #[derive(Debug)]
 pub(crate) struct Seat {
@@ -199,6 +203,19 @@ impl Block {
         }
         if let Some(later) = self.objects.get(place + AHEAD) {
             later.prefetch_parts(simd);
+        }
+    }
+
+    /// Asks for what renderers read of the objects soon after the one at `place`: where all are updated before one is drawn, or
+    /// are drawn by another core, that is in no near cache.
+    pub(crate) fn prefetch_drawn_after(&self, place: usize) {
+        if let Some(later) = self.objects.get(place + 2 * AHEAD_OF_DRAWING) {
+            prefetch(later);
+        }
+        let later = self.objects.get(place + AHEAD_OF_DRAWING);
+        if let Some(mesh) = later.and_then(|later| later.geometry.as_mesh()) {
+            let [positions, _] = mesh.lines();
+            prefetch(positions);
         }
     }
 
