@@ -7,12 +7,17 @@ use dualframe_core::latest::Latest;
 use dualframe_core::pipeline::Config;
 
 use crate::flood::{Flood, Sizes, drive, full};
+
+/// Of one unit, with so many tokens.
+fn with_tokens(tokens: u32) -> Sizes {
+    let sizes = Sizes::spatial(1, 2, 0, 1);
+    Sizes { config: Config { tokens, ..sizes.config }, ..sizes }
+}
+
 #[test]
 fn as_many_tokens_as_there_are() {
     for tokens in [0, 1, 3] {
-        let sizes = Sizes::spatial(1, 2, 0, 1);
-        let sizes = Sizes { config: Config { tokens, ..sizes.config }, ..sizes };
-        sizes.with(|pipeline| {
+        with_tokens(tokens).with(|pipeline| {
             let pipeline = pipeline.expect("tables that fit");
             let capacity = tokens as usize;
             let mut held = vec![];
@@ -29,9 +34,7 @@ fn as_many_tokens_as_there_are() {
 #[test]
 fn all_tokens_or_a_shared_renderer() {
     for tokens in [0, 1, 3] {
-        let sizes = Sizes::spatial(1, 2, 0, 1);
-        let sizes = Sizes { config: Config { tokens, ..sizes.config }, ..sizes };
-        sizes.with(|pipeline| {
+        with_tokens(tokens).with(|pipeline| {
             let mut pipeline = pipeline.expect("tables that fit");
             let capacity = tokens as usize;
             let none_left = Err(((), full(Table::Tokens, capacity, capacity + 1)));
@@ -54,8 +57,7 @@ fn all_tokens_or_a_shared_renderer() {
 
 #[test]
 fn no_token_of_another_pipeline_and_no_second_one() {
-    let sizes = Sizes::spatial(1, 2, 0, 1);
-    let sizes = Sizes { config: Config { tokens: 2, ..sizes.config }, ..sizes };
+    let sizes = with_tokens(2);
     sizes.with(|ours| {
         sizes.with(|theirs| {
             let (ours, theirs) = (ours.expect("fits"), theirs.expect("fits"));

@@ -13,6 +13,7 @@ use dualframe_core::ring::QueueSlot;
 use dualframe_core::storage::{InteractionSlot, Memory, UnitSlot, queue_slots};
 use dualframe_core::unit::UnitId;
 use dualframe_core::wait::Spin;
+
 /// Every two units meet, each unit with itself too; each interaction pushes `records`, each
 /// update posts `letters`. What was done and refused is counted.
 #[derive(Default)]

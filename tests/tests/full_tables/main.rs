@@ -13,6 +13,7 @@ use dualframe_core::inbox::From as Sender;
 use dualframe_core::unit::UnitId;
 
 use flood::{Flood, Sizes, drive, full};
+
 #[test]
 fn candidates_beyond_the_table() {
     // 6 units: 15 pairs and 6 units with themselves, in each of 3 frames; room for 4 in a frame.

@@ -6,6 +6,7 @@ use dualframe_core::storage::queue_slots;
 use dualframe_core::unit::UnitId;
 
 use crate::flood::{Sizes, full};
+
 #[test]
 fn memory_that_does_not_fit() {
     let good = Sizes::spatial(5, 20, 10, 3);
